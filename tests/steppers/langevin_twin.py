@@ -24,7 +24,9 @@ SPEED = np.sqrt(HEAT / MASS)
 """Thermal speed along an axis, m/s."""
 
 
-def particles(a, steps, number=1, position=0.0, velocity=0.0, trap=0.0, shear=0.0, fall=0.0, wind=0.0, **more):
+def particles(
+    a, steps, number=1, position=0.0, velocity=0.0, trap=0.0, shear=0.0, fall=0.0, wind=0.0, **more
+):
     """Spheres of 100 nm in water, in steps of a m/gamma.
 
     trap : omega m/gamma of a spring to the origin. shear : rate (gamma/m) of a flow along x that grows along

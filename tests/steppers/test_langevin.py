@@ -107,7 +107,7 @@ def test_diffusion_and_drift_do_not_depend_on_the_step(a):
 
 
 def test_trapped_particles_have_the_variance_kt_over_k_at_any_step():
-    """0.42 of the critical step. Schemes that kick twice by half of the noise would give 1.21 instead of 1."""
+    """0.42 of the critical step. Schemes with half of the noise on each side of the drift give 1.21."""
     trials = [(0.2, 0.7), (2.0, 0.7), (10.0, 0.7), (10.0, 0.1)]
     scenes = [
         particles(a, round(60 * (1 + a) / square), MANY // 2, trap=np.sqrt(square) / a, seed=k)
@@ -183,7 +183,7 @@ def test_motion_in_a_shear_flow_is_of_second_order():
     number, end, rate = np.array([8, 16, 32, 64]), 3.0, 0.7
 
     def accelerate(t, z):
-        x, y, vx, vy = z
+        _, y, vx, vy = z
         return [vx, vy, rate * y - vx, -vy]
 
     exact = solve_ivp(accelerate, (0, end), [0.0, 0.3, 0.0, 1.0], rtol=1e-12, atol=1e-14).y[:, -1]

@@ -46,9 +46,9 @@ class Langevin(Stepper):
 
         m dv = F dt - gamma (v - u) dt + sqrt(2 gamma kT) dW,    gamma = 6 pi eta R
 
-    u is the sum of all sources of a flow velocity, F the sum of forces, and W a Wiener process. One step, with
+    u is the sum of all sources of a flow velocity, F the sum of forces, and W a Wiener process. A step, with
     one force evaluation, is the splitting BAOAB with b dt in place of dt, where a = gamma dt/m, c = exp(-a),
-    b^2 = tanh(a/2) / (a/2) and g is normal noise:
+    b^2 = tanh(a/2) / (a/2), and g is normal noise:
 
         v += b dt/2 F/m,    r += b dt/2 v,    v = c v + sqrt((1 - c^2) kT/m) g,    r += b dt/2 v,
         v += b dt/2 F'/m
@@ -135,7 +135,8 @@ class KickAndScatter(MoveParticles):
             if ti.static(self.flows):
                 middle = s.time[w] + 0.5 * s.dt[w]
                 u = self.fluid.flow(w, self.domain.wrap(w, r + path, middle), middle)
-            noise = 2.0 * ti.sqrt(h * self.fluid.heat(w) / s.mass[w, i]) * self.fluid.normals(w, i, s.steps[w])
+            width = 2.0 * ti.sqrt(h * self.fluid.heat(w) / s.mass[w, i])
+            noise = width * self.fluid.normals(w, i, s.steps[w])
             v = u + ((1.0 - h) * (v - u) + noise) / (1.0 + h)
             path += half * (u + b * (v - u))
             if ti.static(self.guarded):

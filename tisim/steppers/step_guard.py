@@ -53,9 +53,7 @@ def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
 
 
 @ti.func
-def check_step(
-    s, w, i, dt, path, force, torque, turns: ti.template(), patient: ti.template()  # type: ignore[valid-type]
-):
+def check_step(s, w, i, dt, path, force, torque, turns: ti.template(), patient: ti.template()):  # type: ignore[valid-type]
     """Stop the world if dt (s) is beyond 0.45 of the critical step of particle i. The particle has moved by a
     ``path`` of this length (m) and, if it ``turns``, rotated by dt spin since the last forces; ``force`` (N)
     and ``torque`` (N m) are the new ones.
