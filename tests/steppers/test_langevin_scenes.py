@@ -136,6 +136,11 @@ def test_fixed_particles_stay():
     np.testing.assert_array_equal(after.state["position"][held], before.state["position"][held])
     assert np.abs(after.state["velocity"][held]).max() == 0
     assert (after.state["position"][~held] != before.state["position"][~held]).all()
+    # The guard does not mistake the force that ends for one that changes with the place.
+    strong = particles(0.5, 40, 50, extra=(Stop(place=-1.0),), fall=200.0)
+    simulation.load([strong])
+    simulation.run()
+    assert simulation.results()[0].status.ok, simulation.results()[0].status.reason
 
 
 @pytest.mark.long
