@@ -26,7 +26,7 @@ from tisim.analysis.flow_curves import Estimate
 from tisim.errors import must
 from tisim.numerics.statistics import CONFIDENCE
 
-FARTHEST = 9.0
+FARTHEST_DEVIATION = 9.0
 """The distribution of ln mu is summed up to this number of standard deviations from its middle, and on by as
 much as factors of x or 1/x move it."""
 TERMS = 9
@@ -34,7 +34,7 @@ TERMS = 9
 RESOLVED, CLASSES = (1.0, 3.0), 40
 """Range of the classes: x of the smallest in the strongest field, and of the largest in the weakest one; and
 the number of classes."""
-DISTANCE, LOG_DISTANCE = 0.5, 0.3
+POINT_DISTANCE, POINT_RATIO = 0.5, 0.3
 """Distance of two points of the sum, in standard deviations of ln mu and in ln mu, at most: the trapezoidal
 rule then has an error below 1e-12, because L(exp(ln x)) is analytic within pi/2 of the real axis."""
 
@@ -268,8 +268,8 @@ def _points(
     must(radii.median > 0, "radii.median", "above 0", radii.median)
     must(radii.width >= 0, "radii.width", "at least 0", radii.width)
     deviation = 3 * radii.width
-    distance = min(DISTANCE, LOG_DISTANCE / deviation) if deviation > 0 else DISTANCE
-    last = math.ceil((FARTHEST + deviation) / distance)
+    distance = min(POINT_DISTANCE, POINT_RATIO / deviation) if deviation > 0 else POINT_DISTANCE
+    last = math.ceil((FARTHEST_DEVIATION + deviation) / distance)
     z = distance * np.arange(-last, last + 1)
     weights = np.exp(-(z**2) / 2)
     middle = _moment(radii.median, material) * math.exp(9 * radii.width**2)
