@@ -239,8 +239,9 @@ def fit_radius_classes(
     unit = _alignment(temperature)
     if radius is None:
         size = np.abs(h[h != 0])
-        ends = (x / (unit * at) for x, at in zip(RESOLVED, (size.max(), size.min()), strict=True))
-        r = np.geomspace(*(_radius(moment, material) for moment in ends), CLASSES)
+        ends = zip(RESOLVED, (size.max(), size.min()), strict=True)
+        smallest, largest = (_radius(x / (unit * at), material) for x, at in ends)
+        r = np.geomspace(smallest, largest, CLASSES)
     else:
         r = np.asarray(radius, float)
         must(
