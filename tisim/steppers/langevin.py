@@ -7,10 +7,9 @@ dt/m, c = exp(-a), b^2 = tanh(a/2) / (a/2), and normal numbers g,
     v += b dt/2 F/m,    r += b dt/2 v,    v = c v + sqrt((1 - c^2) kT/m) g,    r += b dt/2 v,
     v += b dt/2 F'/m
 
-Of the splittings with one force evaluation a step, BAOAB alone gives the exact variance of the position in a
-harmonic trap, kT/k for any stable step. Its free particles diffuse too fast, by (a/2) coth(a/2) = 1/b^2; the
-factor b makes their diffusion and their drift under a force exact too (tests/benchmarks/langevin.py compares
-six schemes). The scheme of Groenbech-Jensen and Farago (2013) shares these properties, but replaces c by (1 -
+BAOAB gives the exact variance of the position in a harmonic trap, kT/k for any stable step, with one force
+evaluation a step. Its free particles diffuse too fast, by (a/2) coth(a/2) = 1/b^2; the factor b makes their
+diffusion and their drift under a force exact too (tests/benchmarks/langevin.py compares six schemes). The scheme of Groenbech-Jensen and Farago (2013) shares these properties, but replaces c by (1 -
 a/2) / (1 + a/2), which is negative for a > 2: velocities then alternate.
 
 In a flow u the factor b scales the velocity relative to the fluid only, as the fluid carries particles along
