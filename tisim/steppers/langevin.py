@@ -9,8 +9,9 @@ dt/m, c = exp(-a), b^2 = tanh(a/2) / (a/2), and normal numbers g,
 
 BAOAB gives the exact variance of the position in a harmonic trap, kT/k for any stable step, with one force
 evaluation a step. Its free particles diffuse too fast, by (a/2) coth(a/2) = 1/b^2; the factor b makes their
-diffusion and their drift under a force exact too (tests/benchmarks/langevin.py compares six schemes). The scheme of Groenbech-Jensen and Farago (2013) shares these properties, but replaces c by (1 -
-a/2) / (1 + a/2), which is negative for a > 2: velocities then alternate.
+diffusion and their drift under a force exact too (tests/benchmarks/langevin.py compares six schemes). The
+scheme of Groenbech-Jensen and Farago (2013) shares these properties, but replaces c by (1 - a/2) / (1 + a/2),
+which is negative for a > 2: velocities then alternate.
 
 In a flow u the factor b scales the velocity relative to the fluid only, as the fluid carries particles along
 with all of u: r += dt/2 (u + b (v - u)).
