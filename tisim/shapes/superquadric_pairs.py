@@ -108,33 +108,29 @@ def _start(c, turn, a_i, a_j, start):
     two spheres. The others are the normals of faces of boxes: the axes of i, those of j, and their products.
     """
     n = c
-    if start == 0:
-        m = turn @ ti.Matrix.diag(3, 1.0) * 0.0
-        for p, q in ti.static(ti.ndrange(3, 3)):
-            for k in ti.static(range(3)):
-                m[p, q] += turn[p, k] * a_j[k] * a_j[k] * turn[q, k]
-        for k in ti.static(range(3)):
-            m[k, k] += a_i[k] * a_i[k]
-        rows = [ti.Vector([m[k, 0], m[k, 1], m[k, 2]]) for k in ti.static(range(3))]
+    kind, first = (start + 2) // 3, (start + 2) % 3
+    if kind == 0:
+        square_i, square_j, back = a_i * a_i, a_j * a_j, turn.transpose()
+        rows = [square_i * _unit(c, k) + turn @ (square_j * (back @ _unit(c, k))) for k in ti.static(range(3))]
         # By Cramer's rule, without the determinant, which is positive.
         n = c[0] * rows[1].cross(rows[2]) + c[1] * rows[2].cross(rows[0]) + c[2] * rows[0].cross(rows[1])
+    elif kind == 1:
+        n = _unit(c, first)
+    elif kind == 2:
+        n = turn @ _unit(c, first)
     else:
-        axes = turn @ ti.Matrix.diag(3, 1.0)
-        first, second = (start - 1) % 3, (start - 1) // 3
-        one, other = 0.0 * c, 0.0 * c
-        for k in ti.static(range(3)):
-            one[k] = ti.select(first == k, 1.0, 0.0)
-            column = ti.Vector([axes[0, k], axes[1, k], axes[2, k]])
-            other += ti.select((second - 2 == k) | ((second == 1) & (first == k)), 1.0, 0.0) * column
-        n = one
-        if second == 1:
-            n = other
-        elif second > 1:
-            n = one.cross(other)
+        n = _unit(c, first).cross(turn @ _unit(c, kind - 3))
     side = ti.select(n.dot(c) < 0.0, -1.0, 1.0)
     size = n.norm()
     up = ti.Vector([0.0 * size, 0.0 * size, 1.0 + 0.0 * size])
     return ti.select(size > 0.0, side / ti.select(size > 0.0, size, 1.0) * n, up)
+
+
+@ti.func
+def _unit(like, k):
+    """Return coordinate axis k as a vector of the type of ``like``."""
+    zero = 0.0 * like[0]
+    return ti.Vector([ti.select(k == axis, zero + 1.0, zero) for axis in ti.static(range(3))])
 
 
 @ti.func
@@ -179,6 +175,9 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
             part = ti.min(1.0, LARGEST_STEP / ti.max(step.norm(), 1e-300))
             if predicted <= TOLERANCE * size or d > far:
                 pending = 0
+                # Only a step of Newton's that is the last one is right without a test.
+                if predicted > TOLERANCE * size:
+                    step *= 0.0
                 # The points move as the radii of curvature give for the last step, which closes their
                 # distance across n: on flat faces they are defined by the other body.
                 step_j = back @ step
