@@ -55,7 +55,7 @@ class Bodies(NamedTuple):
 
 @ti.func
 def _vector(array: ti.template(), m, size: ti.template()):
-    return ti.Vector([array[m, k] for k in ti.static(range(size))])
+    return ti.Vector([ti.cast(array[m, k], float) for k in ti.static(range(size))])
 
 
 @ti.func
@@ -89,11 +89,11 @@ def _rods(c: Array, qi: Array, rod_i: Array, qj: Array, rod_j: Array, out: Array
         gap, normal, x, y = closest_rods(
             _vector(c, m, 3),
             ti.Vector([turn_i[0, 2], turn_i[1, 2], turn_i[2, 2]]),
-            rod_i[m, 0],
-            rod_i[m, 1],
+            ti.cast(rod_i[m, 0], float),
+            ti.cast(rod_i[m, 1], float),
             ti.Vector([turn_j[0, 2], turn_j[1, 2], turn_j[2, 2]]),
-            rod_j[m, 0],
-            rod_j[m, 1],
+            ti.cast(rod_j[m, 0], float),
+            ti.cast(rod_j[m, 1], float),
         )
         _write(out, m, gap, normal, x, y)
 
@@ -101,7 +101,7 @@ def _rods(c: Array, qi: Array, rod_i: Array, qj: Array, rod_j: Array, out: Array
 @ti.kernel
 def _spheres(c: Array, radii: Array, out: Array):
     for m in range(c.shape[0]):
-        gap, normal, x, y = closest_spheres(_vector(c, m, 3), radii[m, 0], radii[m, 1])
+        gap, normal, x, y = closest_spheres(_vector(c, m, 3), *_vector(radii, m, 2))
         _write(out, m, gap, normal, x, y)
 
 

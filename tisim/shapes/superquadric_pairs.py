@@ -16,7 +16,7 @@ Newton's step is (M_i + M_j + s)^-1 g in the plane normal to n. M is the second 
 eigenvalues are the radii of curvature of the body at x, s = n . (c - x_i - x_j), and g is the tangential part
 of c - x_i - x_j. Flat faces have infinite radii: there h has a kink, across the plane in which a component of
 n is 0 in the frame of the body. Two measures suffice. Components a n of the support function are replaced by
-a sqrt(n^2 + SMOOTHING^2), and a step that fails by crossing a kink is cut at the kink, within which the next
+a sqrt(n^2 + KINK_WIDTH^2), and a step that fails by crossing a kink is cut at the kink, within which the next
 step of Newton finds the point of contact on the face.
 """
 
@@ -24,31 +24,37 @@ from tisim.backend.taichi import ti
 from tisim.numerics import elementary
 from tisim.numerics.vectors import conjugate, product, rotated, rotation_matrix
 
-SMOOTHING = 1e-11
+KINK_WIDTH = 1e-11
 """Width of the kinks of the support function, relative to the semi-axes. It changes the gap by less than
 twice this part of a semi-axis."""
-ITERATIONS = 200
+MOST_EVALUATIONS = 200
 """Largest number of evaluations from one start; 5 to 12 are usual, and the largest of 1e6 random pairs was
 below 80."""
 LARGEST_STEP = 0.5
 """Largest step of the normal (rad)."""
 LEAST_RADIUS = 1e-2
-"""Smallest sum of radii of curvature and gap that a step assumes, relative to the smallest semi-axis."""
-SHARE = 0.05
+"""Smallest sum of radii of curvature and gap that a step assumes if d is not concave, relative to the smallest
+semi-axis."""
+CONCAVE = 1e-8
+"""The sum, relative to the smallest semi-axis, down to which d counts as concave. At a depth equal to the
+sum of the radii of curvature it is 0, and the steps then converge by a factor of 2/3 each."""
+REQUIRED_SHARE = 0.05
 """Share of the predicted increase of d that a step must reach."""
-CUT = 0.3
+STEP_CUT = 0.3
 """Factor by which a step is cut that fails without crossing a kink."""
 CLOSE_KINK, FAR_KINK = 1e-3, 0.9
 """Part of a failed step within which a kink must be to cut the step there."""
-TOLERANCE = 1e-18
+LAST_INCREASE = 1e-18
 """Predicted increase of d at which the iteration ends, relative to the smallest semi-axis."""
-ROUNDING = 4e-15
-"""Rounding error of d, relative to the sum of all semi-axes."""
-DEEP = 0.03
+PLANE_ROUNDING = 4e-15
+"""Rounding error of d, relative to the sum of all semi-axes and components of the separation."""
+NOT_ZERO = 1e-30
+"""A number that in place of 0 prevents a division by it, which f32 can represent."""
+DEEP_OVERLAP = 0.03
 """Depth of an overlap, relative to the smallest semi-axis, beyond which further starts are tried."""
-STARTS = 16
+MOST_STARTS = 16
 """The ellipsoid's normal, six axes, and nine products of axes."""
-ROOT_ROUNDS = 20
+MULTIPLIER_ROUNDS = 20
 """Largest number of iterations for the multiplier of a support point; 0 to 4 are usual."""
 
 
@@ -87,7 +93,7 @@ def closest_superquadrics(
     enough, size = ti.cast(far, ti.f64), ti.min(a_i.min(), a_j.min())
     best, start = ti.cast(0.0, ti.f64), 0
     n, x_i, x_j = 0.0 * c, 0.0 * c, 0.0 * c
-    while start < STARTS and (start == 0 or best < -DEEP * size):
+    while start < MOST_STARTS and (start == 0 or best < -DEEP_OVERLAP * size):
         first = _start(c, turn, a_i, a_j, start)
         value, normal, y_i, y_j = _ascend(ellipsoids, c, turn, a_i, g_i, a_j, g_j, first, enough)
         if start == 0 or value > best:
@@ -137,17 +143,18 @@ def _unit(like, k):
 def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):  # type: ignore[valid-type]
     """Return a maximum of d (m), its normal, and the points of contact relative to both centres (m), in the
     frame of i."""
-    size, noise = ti.min(a_i.min(), a_j.min()), ROUNDING * (a_i.sum() + a_j.sum())
+    size = ti.min(a_i.min(), a_j.min())
+    noise = PLANE_ROUNDING * (a_i.sum() + a_j.sum() + ti.abs(c).sum())
     back = turn.transpose()
     normal, trial, step = start, start, 0.0 * start
     x_i, x_j = 0.0 * c, 0.0 * c
     value, predicted, part = 0.0 * size, 0.0 * size, 0.0 * size
     pending, rounds = 1, 0
-    while pending == 1 and rounds < ITERATIONS:
+    while pending == 1 and rounds < MOST_EVALUATIONS:
         h_i, s_i, d_i, v_i = _support(ellipsoids, trial, a_i, g_i)
         h_j, s_j, d_j, v_j = _support(ellipsoids, back @ trial, a_j, g_j)
         d = c.dot(trial) - h_i - h_j
-        if rounds == 0 or d >= value + SHARE * part * predicted - noise:
+        if rounds == 0 or d >= value + REQUIRED_SHARE * part * predicted - noise:
             normal, value = trial, d
             apart = c - s_i - turn @ s_j
             # Two unit vectors normal to n, without a branch (T. Duff et al., J. Comput. Graph. Tech. 6 (2017) 1).
@@ -162,21 +169,21 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
             tt = (d_i * t).dot(t) - tv_i * tv_i + (d_j * t_j).dot(t_j) - tv_j * tv_j + s
             tu = (d_i * t).dot(u) - tv_i * uv_i + (d_j * t_j).dot(u_j) - tv_j * uv_j
             uu = (d_i * u).dot(u) - uv_i * uv_i + (d_j * u_j).dot(u_j) - uv_j * uv_j + s
-            # Where d is not concave, the radii are increased until the smallest is at least LEAST_RADIUS.
+            # If d is not concave, the radii are increased until the smallest is LEAST_RADIUS.
             mean, spread = 0.5 * (tt + uu), ti.sqrt(0.25 * (tt - uu) * (tt - uu) + tu * tu)
             large = ti.abs(mean) + spread
-            least = ti.select(mean > 0.0, (tt * uu - tu * tu) / ti.max(large, 1e-300), mean - spread)
-            raised = ti.max(LEAST_RADIUS * size - least, 0.0)
+            least = ti.select(mean > 0.0, (tt * uu - tu * tu) / ti.max(large, NOT_ZERO), mean - spread)
+            raised = ti.select(least > CONCAVE * size, 0.0, LEAST_RADIUS * size - least)
             tt, uu = tt + raised, uu + raised
             g_t, g_u, det = apart.dot(t), apart.dot(u), tt * uu - tu * tu
             s_t, s_u = (uu * g_t - tu * g_u) / det, (tt * g_u - tu * g_t) / det
             step = s_t * t + s_u * u
             predicted = g_t * s_t + g_u * s_u
-            part = ti.min(1.0, LARGEST_STEP / ti.max(step.norm(), 1e-300))
-            if predicted <= TOLERANCE * size or d > far:
+            part = ti.min(1.0, LARGEST_STEP / ti.max(step.norm(), NOT_ZERO))
+            if predicted <= LAST_INCREASE * size or d > far:
                 pending = 0
                 # Only a step of Newton's that is the last one is right without a test.
-                if predicted > TOLERANCE * size:
+                if predicted > LAST_INCREASE * size:
                     step *= 0.0
                 # The points move as the radii of curvature give for the last step, which closes their
                 # distance across n: on flat faces they are defined by the other body.
@@ -193,7 +200,7 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
                     at = -n[k] / ti.select(v[k] == 0.0, 1.0, v[k])
                     inside = (at > CLOSE_KINK * limit) & (at < FAR_KINK * limit)
                     nearest = ti.min(nearest, ti.select(inside, at, 2.0))
-            part = ti.select(nearest < 1.0, nearest, CUT * limit)
+            part = ti.select(nearest < 1.0, nearest, STEP_CUT * limit)
         trial = (normal + part * step).normalized()
         rounds += 1
     return value, normal, x_i, x_j
@@ -206,7 +213,7 @@ def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
 
     For an ellipsoid h^2 = sum_k (a_k n_k)^2. In general the farthest point is at
 
-        |x_k/a_k| = u_k = (w_k/(g_k m))^(1/(g_k - 1)),    w_k = a_k sqrt(n_k^2 + SMOOTHING^2)
+        |x_k/a_k| = u_k = (w_k/(g_k m))^(1/(g_k - 1)),    w_k = a_k sqrt(n_k^2 + KINK_WIDTH^2)
 
     and h = sum_k w_k u_k, with m such that the point is on the surface: with p_k = g_k/(g_k - 1),
 
@@ -222,7 +229,7 @@ def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
         x /= h
         d, v = square / h, x / ti.sqrt(h)
     else:
-        w = a * ti.sqrt(n * n + SMOOTHING * SMOOTHING)
+        w = a * ti.sqrt(n * n + KINK_WIDTH * KINK_WIDTH)
         root = 1.0 / (g - 1.0)
         p = g * root
         logs = ti.Vector([elementary.log(w[k] / g[k]) for k in ti.static(range(3))])
@@ -234,7 +241,7 @@ def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
             e /= total
         else:
             searching, rounds = 1, 0
-            while searching == 1 and rounds < ROOT_ROUNDS:
+            while searching == 1 and rounds < MULTIPLIER_ROUNDS:
                 total = e.sum()
                 change = elementary.log(total) * total / p.dot(e)
                 log_m += change
@@ -250,6 +257,6 @@ def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
         slope = a * a * n / w
         x = slope * u
         v = x * root
-        d = slope * v / w + u * a * a * a * a * (SMOOTHING * SMOOTHING) / (w * w * w)
+        d = slope * v / w + u * a * a * a * a * (KINK_WIDTH * KINK_WIDTH) / (w * w * w)
         v /= ti.sqrt(w.dot(u * root))
     return h, x, d, v
