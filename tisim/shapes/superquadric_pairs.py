@@ -146,13 +146,14 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
     size = ti.min(a_i.min(), a_j.min())
     noise = PLANE_ROUNDING * (a_i.sum() + a_j.sum() + ti.abs(c).sum())
     back = turn.transpose()
+    body_i, body_j = _constants(ellipsoids, a_i, g_i), _constants(ellipsoids, a_j, g_j)
     normal, trial, step = start, start, 0.0 * start
     x_i, x_j = 0.0 * c, 0.0 * c
     value, predicted, part = 0.0 * size, 0.0 * size, 0.0 * size
     pending, rounds = 1, 0
     while pending == 1 and rounds < MOST_EVALUATIONS:
-        h_i, s_i, d_i, v_i = _support(ellipsoids, trial, a_i, g_i)
-        h_j, s_j, d_j, v_j = _support(ellipsoids, back @ trial, a_j, g_j)
+        h_i, s_i, d_i, v_i, f_i = _support(ellipsoids, trial, body_i)
+        h_j, s_j, d_j, v_j, f_j = _support(ellipsoids, back @ trial, body_j)
         d = c.dot(trial) - h_i - h_j
         if rounds == 0 or d >= value + REQUIRED_SHARE * part * predicted - noise:
             normal, value = trial, d
@@ -166,9 +167,9 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
             t_j, u_j = back @ t, back @ u
             tv_i, uv_i, tv_j, uv_j = v_i.dot(t), v_i.dot(u), v_j.dot(t_j), v_j.dot(u_j)
             s = apart.dot(normal)
-            tt = (d_i * t).dot(t) - tv_i * tv_i + (d_j * t_j).dot(t_j) - tv_j * tv_j + s
-            tu = (d_i * t).dot(u) - tv_i * uv_i + (d_j * t_j).dot(u_j) - tv_j * uv_j
-            uu = (d_i * u).dot(u) - uv_i * uv_i + (d_j * u_j).dot(u_j) - uv_j * uv_j + s
+            tt = (d_i * t).dot(t) - f_i * tv_i * tv_i + (d_j * t_j).dot(t_j) - f_j * tv_j * tv_j + s
+            tu = (d_i * t).dot(u) - f_i * tv_i * uv_i + (d_j * t_j).dot(u_j) - f_j * tv_j * uv_j
+            uu = (d_i * u).dot(u) - f_i * uv_i * uv_i + (d_j * u_j).dot(u_j) - f_j * uv_j * uv_j + s
             # If d is not concave, the radii are increased until the smallest is LEAST_RADIUS.
             mean, spread = 0.5 * (tt + uu), ti.sqrt(0.25 * (tt - uu) * (tt - uu) + tu * tu)
             large = ti.abs(mean) + spread
@@ -176,7 +177,7 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
             raised = ti.select(least > CONCAVE * size, 0.0, LEAST_RADIUS * size - least)
             tt, uu = tt + raised, uu + raised
             g_t, g_u, det = apart.dot(t), apart.dot(u), tt * uu - tu * tu
-            s_t, s_u = (uu * g_t - tu * g_u) / det, (tt * g_u - tu * g_t) / det
+            s_t, s_u = (uu * g_t - tu * g_u) * (1.0 / det), (tt * g_u - tu * g_t) * (1.0 / det)
             step = s_t * t + s_u * u
             predicted = g_t * s_t + g_u * s_u
             part = ti.min(1.0, LARGEST_STEP / ti.max(step.norm(), NOT_ZERO))
@@ -188,9 +189,9 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
                 # The points move as the radii of curvature give for the last step, which closes their
                 # distance across n: on flat faces they are defined by the other body.
                 step_j = back @ step
-                x_i = s_i + d_i * step - v_i.dot(step) * v_i
-                x_j = turn @ (-s_j - d_j * step_j + v_j.dot(step_j) * v_j)
-                normal = (normal + step).normalized()
+                x_i = s_i + d_i * step - f_i * v_i.dot(step) * v_i
+                x_j = turn @ (-s_j - d_j * step_j + f_j * v_j.dot(step_j) * v_j)
+                normal = _scaled_to_1(normal + step)
         else:
             # The nearest kink that the step crosses, of either body.
             limit, nearest = part, ti.cast(2.0, ti.f64)
@@ -201,15 +202,32 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
                     inside = (at > CLOSE_KINK * limit) & (at < FAR_KINK * limit)
                     nearest = ti.min(nearest, ti.select(inside, at, 2.0))
             part = ti.select(nearest < 1.0, nearest, STEP_CUT * limit)
-        trial = (normal + part * step).normalized()
+        trial = _scaled_to_1(normal + part * step)
         rounds += 1
     return value, normal, x_i, x_j
 
 
 @ti.func
-def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
-    """Return h(n) (m), the farthest point x along a unit vector n (m), and vectors d and v of its derivative
-    dx/dn = diag(d) - v v^T (m).
+def _scaled_to_1(v):
+    """Return a vector divided by its length."""
+    return 1.0 / v.norm() * v
+
+
+@ti.func
+def _constants(ellipsoids: ti.template(), a, g):  # type: ignore[valid-type]
+    """Return the numbers that the support function of a body reads: a_k^2 for an ellipsoid; otherwise
+    ln(a_k/g_k), g_k and 1/(g_k - 1)."""
+    scale, inverse = a * a, 0.0 * a
+    if ti.static(not ellipsoids):
+        scale = ti.Vector([elementary.log(a[k] / g[k]) for k in ti.static(range(3))])
+        inverse = 1.0 / (g - 1.0)
+    return scale, g, inverse
+
+
+@ti.func
+def _support(ellipsoids: ti.template(), n, body):  # type: ignore[valid-type]
+    """Return h(n) (m), the farthest point x along a unit vector n (m), and d, v and f of its derivative
+    dx/dn = diag(d) - f v v^T (m).
 
     For an ellipsoid h^2 = sum_k (a_k n_k)^2. In general the farthest point is at
 
@@ -217,28 +235,32 @@ def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
 
     and h = sum_k w_k u_k, with m such that the point is on the surface: with p_k = g_k/(g_k - 1),
 
-        sum_k e_k = 1,    e_k = (w_k/(g_k m))^p_k,    u_k = m g_k e_k/w_k
+        sum_k e_k = 1,    e_k = (w_k/(g_k m))^p_k,    w_k u_k = m g_k e_k
 
-    ln m follows by Newton's method, for equal exponents in one step.
+    ln m follows by Newton's method, for equal exponents in one step. With y_k = w_k u_k/(n_k^2 + KINK_WIDTH^2)
+    and q_k = 1/(g_k - 1),
+
+        x_k = y_k n_k,    d_k = y_k (q_k n_k^2 + KINK_WIDTH^2)/(n_k^2 + KINK_WIDTH^2)
+        v_k = q_k x_k,    1/f = sum_k q_k w_k u_k
     """
-    h, x, d, v = 0.0 * n[0], 0.0 * n, 0.0 * n, 0.0 * n
+    scale, g, q = body
+    h, f, x, d, v = 0.0 * n[0], 0.0 * n[0], 0.0 * n, 0.0 * n, 0.0 * n
     if ti.static(ellipsoids):
-        square = a * a
-        x = square * n
-        h = ti.sqrt(x.dot(n))
-        x /= h
-        d, v = square / h, x / ti.sqrt(h)
+        h = ti.sqrt((scale * n).dot(n))
+        inverse = 1.0 / h
+        x, d = inverse * scale * n, inverse * scale
+        v, f = x, inverse
     else:
-        w = a * ti.sqrt(n * n + KINK_WIDTH * KINK_WIDTH)
-        root = 1.0 / (g - 1.0)
-        p = g * root
-        logs = ti.Vector([elementary.log(w[k] / g[k]) for k in ti.static(range(3))])
+        width = KINK_WIDTH * KINK_WIDTH
+        square = n * n + width
+        p = g * q
+        logs = scale + 0.5 * ti.Vector([elementary.log(square[k]) for k in ti.static(range(3))])
         log_m = logs.max()
         e = ti.Vector([elementary.exp(p[k] * (logs[k] - log_m)) for k in ti.static(range(3))])
         if g[0] == g[1] and g[1] == g[2]:
             total = e.sum()
             log_m += elementary.log(total) / p[0]
-            e /= total
+            e *= 1.0 / total
         else:
             searching, rounds = 1, 0
             while searching == 1 and rounds < MULTIPLIER_ROUNDS:
@@ -252,11 +274,11 @@ def _support(ellipsoids: ti.template(), n, a, g):  # type: ignore[valid-type]
                 else:
                     e = ti.Vector([elementary.exp(p[k] * (logs[k] - log_m)) for k in ti.static(range(3))])
                 rounds += 1
-        u = elementary.exp(log_m) * g * e / w
-        h = w.dot(u)
-        slope = a * a * n / w
-        x = slope * u
-        v = x * root
-        d = slope * v / w + u * a * a * a * a * (KINK_WIDTH * KINK_WIDTH) / (w * w * w)
-        v /= ti.sqrt(w.dot(u * root))
-    return h, x, d, v
+        heights = elementary.exp(log_m) * g * e
+        h = heights.sum()
+        inverse = 1.0 / square
+        y = heights * inverse
+        x = y * n
+        d = y * (q * n * n + width) * inverse
+        v, f = q * x, 1.0 / q.dot(heights)
+    return h, x, d, v, f
