@@ -12,6 +12,7 @@ from tests.shapes.pairs import (
     beside,
     plane_distance,
     random_bodies,
+    rod_contacts,
     searched_gap,
     sphere_contacts,
     superquadric_contacts,
@@ -69,7 +70,7 @@ def test_no_overlapping_pair_fails(count, rng):
 
 
 @pytest.mark.parametrize(
-    ("count", "directions", "kept"), [(100, 500, 6), pytest.param(20_000, 2000, 12, marks=pytest.mark.slow)]
+    ("count", "directions", "kept"), [(100, 500, 6), pytest.param(4_000, 1000, 8, marks=pytest.mark.slow)]
 )
 def test_no_search_without_derivatives_finds_a_larger_distance_of_planes(count, directions, kept, rng):
     """The depth of an overlap is the shortest translation that separates: the largest d over all normals."""
@@ -145,11 +146,13 @@ def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
     i, j, separation, _, _ = random_pairs(rng, count, -0.3, 0.3, largest=2.0)
     contact = superquadric_contacts(separation, i, j, ellipsoids=True)
     gaps, normals = by_coal(separation, i, j)
-    # For one overlapping pair in some hundred coal gives no answer.
+    # coal gives no answer for one overlapping pair in some hundred, and a larger depth for one in some 10,000.
     answered = np.abs(gaps) < 1e300
+    assert (contact.gap - gaps)[answered].min() > -2e-7
+    same = np.abs(contact.gap - gaps) < 2e-7
     assert (~answered).sum() < 0.01 * count
-    np.testing.assert_allclose(gaps[answered], contact.gap[answered], rtol=0, atol=2e-7)
-    turned = np.linalg.norm(np.cross(normals, contact.normal)[answered], axis=1)
+    assert (answered & ~same).sum() < 1e-3 * count
+    turned = np.linalg.norm(np.cross(normals, contact.normal)[same], axis=1)
     assert (turned > 5e-3).sum() == 0, turned.max()
 
 
@@ -158,6 +161,50 @@ def test_ellipsoids_have_a_code_path_of_their_own_with_the_same_results(rng):
     general, own = (superquadric_contacts(separation, i, j, ellipsoids=one) for one in (False, True))
     for one, other in zip(own, general, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e6])
+def test_results_scale_with_lengths(scale, rng):
+    i, j, separation, _, _ = random_pairs(rng, 3000, -0.1, 0.3)
+    contact = superquadric_contacts(separation, i, j)
+    small = superquadric_contacts(scale * separation, *(one._replace(axes=scale * one.axes) for one in (i, j)))
+    np.testing.assert_allclose(small.normal, contact.normal, rtol=0, atol=1e-8)
+    for one, other in zip((small.gap, *small[2:]), (contact.gap, *contact[2:]), strict=True):
+        np.testing.assert_allclose(one / scale, other, rtol=0, atol=1e-8)
+
+
+def errors_in_this_runtime():
+    """Largest errors of gap and normal of pairs of known gap, superquadrics and rods."""
+    rng = np.random.default_rng(2)
+    i, j, separation, normal, gap = random_pairs(rng, 5000, 0.0, 0.3)
+    contact = superquadric_contacts(separation, i, j)
+    turns = [Rotation.random(5000, rng=rng) for _ in range(2)]
+    rods = np.tile([2.0, 0.5], (5000, 1))
+    axes = [turn.apply([0, 0, 1]) for turn in turns]
+    across = unit(np.cross(*axes))
+    along = rng.uniform(-2, 2, (2, 5000, 1))
+    place = along[0] * axes[0] - along[1] * axes[1] + (1 + gap[:, None]) * across
+    rod = rod_contacts(place, turns[0], rods, turns[1], rods)
+    return [
+        float(np.abs(contact.gap - gap).max()),
+        float(np.linalg.norm(np.cross(contact.normal, normal), axis=1).max()),
+        float(np.abs(rod.gap - gap).max()),
+        float(np.linalg.norm(np.cross(rod.normal, across), axis=1).max()),
+    ]
+
+
+def test_errors_in_single_precision_are_those_of_its_input(single):
+    """Inputs are rounded to f32; the gap follows to a part in 1e6 of the separation, and a normal to the
+    rounding divided by the smallest radius of curvature."""
+    gap, _, rod, turned = single("shapes.test_superquadric_pairs", "errors_in_this_runtime")
+    assert gap < 1e-5
+    assert rod < 1e-5
+    assert turned < 1e-3
+
+
+def test_fast_arithmetic_gives_the_same_to_rounding(in_fast_arithmetic):
+    errors = in_fast_arithmetic("shapes.test_superquadric_pairs", "errors_in_this_runtime")
+    assert max(errors) < 1e-9
 
 
 def test_spheres_are_superquadrics_of_equal_axes(rng):

@@ -50,8 +50,9 @@ PLANE_ROUNDING = 4e-15
 """Rounding error of d, relative to the sum of all semi-axes and components of the separation."""
 NOT_ZERO = 1e-30
 """A number that in place of 0 prevents a division by it, which f32 can represent."""
-DEEP_OVERLAP = 0.03
-"""Depth of an overlap, relative to the smallest semi-axis, beyond which further starts are tried."""
+DEEP_OVERLAP = 0.1
+"""Depth of an overlap, relative to the smallest semi-axis, beyond which further starts are tried. Of 200,000
+random pairs, the first start missed the largest d of none up to a depth of 0.19 and of one in 100 at 0.4."""
 MOST_STARTS = 16
 """The ellipsoid's normal, six axes, and nine products of axes."""
 MULTIPLIER_ROUNDS = 20
