@@ -61,7 +61,9 @@ class Pairs:
         self.rod = shape.rod()
         axes, exponents = shape.superquadric() or ((1.0,) * 3, (2.0,) * 3)
         self.axes, self.exponents, self.ellipsoid = axes, exponents, max(exponents) == 2
-        self.c, self.p, self.q, self.out = ([ti.field(real, count) for _ in range(n)] for n in (3, 4, 4, VALUES))
+        self.c, self.p, self.q, self.out = (
+            [ti.field(real, count) for _ in range(n)] for n in (3, 4, 4, VALUES)
+        )
 
     def place(self, draw: np.random.Generator) -> None:
         """Place the pairs: separations at which support planes along a random normal are a gap apart."""
@@ -73,7 +75,11 @@ class Pairs:
         self.separation = sum(points) + gap[:, None] * normal
         quaternions = [turn.as_quat(scalar_first=True) for turn in self.turns]
         real = np.float64 if runtime.current().precision == "f64" else np.float32
-        for columns, values in ((self.c, self.separation), (self.p, quaternions[0]), (self.q, quaternions[1])):
+        for columns, values in (
+            (self.c, self.separation),
+            (self.p, quaternions[0]),
+            (self.q, quaternions[1]),
+        ):
             for column, value in zip(columns, values.T, strict=True):
                 column.from_numpy(np.ascontiguousarray(value, real))
 

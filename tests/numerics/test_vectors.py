@@ -57,7 +57,9 @@ def test_quaternions_rotate_and_multiply_as_in_scipy(rng):
     np.testing.assert_allclose(by_quaternion, q.apply(v), rtol=0, atol=1e-14)
     np.testing.assert_allclose(by_matrix, q.apply(v), rtol=0, atol=1e-14)
     _multiply(p.as_quat(scalar_first=True), q.as_quat(scalar_first=True), both)
-    np.testing.assert_allclose(Rotation.from_quat(both, scalar_first=True).apply(v), (p * q).apply(v), atol=1e-14)
+    np.testing.assert_allclose(
+        Rotation.from_quat(both, scalar_first=True).apply(v), (p * q).apply(v), atol=1e-14
+    )
 
 
 def test_the_smallest_rotation_between_two_vectors_is_about_their_common_normal(rng):

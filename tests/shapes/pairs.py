@@ -149,16 +149,16 @@ def unit(vectors):
 
 def random_bodies(rng, count, largest=20.0, aspect=10.0):
     """Superquadrics of volume about 8, with exponents from 2 to ``largest`` and aspect ratios up to
-    ``aspect``: a fifth each of supercuboids, of ellipsoids, of the largest exponent, of equal axes, and of
-    unequal axes and exponents."""
+    ``aspect``: a sixth each of supercuboids, of ellipsoids, of the largest exponent, of equal axes, of
+    spheres, and of unequal axes and exponents."""
     axes = aspect ** rng.uniform(-0.5, 0.5, (count, 3))
     axes /= np.cbrt(axes.prod(axis=1))[:, None]
     exponents = 2 * (largest / 2) ** rng.uniform(0, 1, (count, 3))
-    kind = rng.integers(0, 5, count)
+    kind = rng.integers(0, 6, count)
     exponents[kind == 0] = exponents[kind == 0][:, :1]
-    exponents[kind == 1] = 2.0
+    exponents[(kind == 1) | (kind == 4)] = 2.0
     exponents[kind == 2] = largest
-    axes[kind == 3] = 1.0
+    axes[(kind == 3) | (kind == 4)] = 1.0
     return Bodies(Rotation.random(count, rng=rng), axes, exponents)
 
 
