@@ -159,10 +159,11 @@ def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
     assert (answered & ~same).sum() < 1e-3 * count
     turned = np.linalg.norm(np.cross(normals, contact.normal), axis=1)
     assert turned[contact.gap > 0].max() < 5e-3
-    # The maxima of deep overlaps may be flat: coal's normals are then less certain than its depths.
+    # The maxima of deep overlaps may be flat, and coal's normals less certain than its depths: d falls by half
+    # the square of the angle times the radii of curvature.
     rows = np.flatnonzero(same)
     planes = plane_distance(normals[rows], separation[rows], i[rows], j[rows])
-    np.testing.assert_allclose(planes, contact.gap[rows], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(planes, contact.gap[rows], rtol=0, atol=1e-4)
 
 
 def test_ellipsoids_have_a_code_path_of_their_own_with_the_same_results(rng):

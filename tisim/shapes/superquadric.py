@@ -26,7 +26,7 @@ class SuperquadricShape(ParticleShape):
         |x/a_1|^g_1 + |y/a_2|^g_2 + |z/a_3|^g_3 = 1                                          (4.3)
         V = a_1 a_2 a_3 e_1 e_2 e_3 G(e_1/2) G(e_2/2) G(e_3/2) / G(1 + e_1/2 + e_2/2 + e_3/2)    (4.21)
 
-    with e_k = 2/g_k, and Euler's function G(n + 1) = n!. The moments of inertia are (4.29) to (4.31) divided by the
+    with e_k = 2/g_k, and Euler's function G(n + 1) = n!. The moments of inertia are (4.29) to (4.31) over the
     volume. The bounding radius of equal exponents g > 2 is
 
         r = (a_1^q + a_2^q + a_3^q)^(1/q),    q = 2 g/(g - 2)                                 (4.38)
