@@ -159,7 +159,7 @@ def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
     assert (answered & ~same).sum() < 1e-3 * count
     turned = np.linalg.norm(np.cross(normals, contact.normal), axis=1)
     assert turned[contact.gap > 0].max() < 5e-3
-    # The maxima of deep overlaps may be flat, and coal's normals less certain than its depths: d falls by half
+    # Maxima of deep overlaps may be flat, and coal's normals less certain than its depths: d falls by half
     # the square of the angle times the radii of curvature.
     rows = np.flatnonzero(same)
     planes = plane_distance(normals[rows], separation[rows], i[rows], j[rows])
