@@ -3,7 +3,7 @@
     python tests/benchmarks/narrow_phase.py [--pairs 4096] [--turns 7] [--precision f64] [--arithmetic strict]
 
 Both give gap, normal and points of contact, on one thread. Turns alternate; the table has medians, and the
-least and largest in brackets. Random orientations, separations in random directions, gaps from -0.05 to 0.3
+least and largest in brackets. Random orientations, separations in random directions, gaps from -0.02 to 0.3
 of the radius of a sphere of equal volume: the neighbours of a dense packing. coal is called from Python: its
 column "per call" is the time of a pair of spheres, of which its own part is some ns, and is included in its
 other times. coal does not know superquadrics.
@@ -49,7 +49,7 @@ CASES: dict[str, ParticleShape] = {
 }
 VALUES = 10
 """Gap, normal and two points."""
-NEAR, FAR, LIMIT = -0.05, 0.3, 0.02
+NEAR, FAR, LIMIT = -0.02, 0.3, 0.02
 """Gaps of the pairs, and the one beyond which pairs do not interact, in radii."""
 
 
