@@ -44,8 +44,9 @@ def check_geometry(contact, separation, turn_i, rod_i, turn_j, rod_j, atol):
         assert (np.abs(on_axis[:, 2]) <= rod[:, 0] + atol).all()
 
 
-def test_rods_touch_at_points_of_both_along_a_common_normal(rng):
-    separation, *pair = random_rods(rng, 100_000)
+@pytest.mark.parametrize("count", [100_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_rods_touch_at_points_of_both_along_a_common_normal(count, rng):
+    separation, *pair = random_rods(rng, count)
     contact = rod_contacts(separation, *pair)
     check_geometry(contact, separation, *pair, atol=1e-12)
     # The normal is across each axis, or at an end of it and outwards.

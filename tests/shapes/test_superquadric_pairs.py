@@ -159,8 +159,8 @@ def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
     assert (answered & ~same).sum() < 1e-3 * count
     turned = np.linalg.norm(np.cross(normals, contact.normal), axis=1)
     assert turned[contact.gap > 0].max() < 5e-3
-    # Planes of this normal are the gap apart, for every pair. coal loses the normal of a few pairs that nearly
-    # touch, and of deep overlaps with a flat maximum.
+    # Planes of this normal are the gap apart, for every pair. coal loses the normal of a few pairs that
+    # nearly touch, and of deep overlaps with a flat maximum.
     own, theirs = (plane_distance(one, separation, i, j) for one in (contact.normal, normals))
     np.testing.assert_allclose(own, contact.gap, rtol=0, atol=1e-10)
     assert (contact.gap - theirs)[same].min() > -1e-10
