@@ -19,25 +19,32 @@ def local_thickness(image: np.ndarray, spacing: float, periodic: bool = True) ->
     periodic : whether the image continues periodically at its edges. Otherwise structures continue beyond
         them without limit.
 
-    Diameters are even numbers of pixels. A structure that fills a periodic image has no thickness: the result
-    is infinite. Raises InputError unless the image is bool and the spacing above 0.
+    Radii of discs are multiples of half a pixel, so that thicknesses are exact to a pixel. A structure that
+    fills the image has no thickness: the result is infinite. Raises InputError unless the image is bool and
+    the spacing above 0.
 
     Source: T. Hildebrand, P. Rueegsegger, J. Microsc. 185 (1997) 67, Eq. (1).
     """
     image = np.asarray(image)
-    must(
-        image.dtype == bool and image.ndim in (2, 3), "image", "bool of two or three dimensions", image.dtype
-    )
+    flat = image.dtype == bool and image.ndim in (2, 3)
+    must(flat, "image", "bool of two or three dimensions", f"{image.dtype} of {image.ndim}")
     must(is_number(spacing) and spacing > 0, "spacing", "a number of m above 0", spacing)
     if image.all():
         return np.full(image.shape, np.inf)
-    # Half of an image on each side: no disc that avoids the images of a point is wider.
-    border = [side // 2 if periodic else 0 for side in image.shape]
-    whole = np.pad(image, [(width, width) for width in border], mode="wrap" if periodic else "edge")
-    free, widest = distance_transform_edt(whole), np.zeros(whole.shape)
-    # Discs are drawn from the largest to the smallest, and each colours the points that are still blank.
-    for radius in range(int(free.max()), 0, -1):
-        covered = distance_transform_edt(free < radius) < radius
-        widest[covered & whole & (widest == 0)] = 2 * radius
-    middle = tuple(slice(width, width + side) for width, side in zip(border, image.shape, strict=True))
-    return np.asarray(spacing * widest[middle])
+    free, widest = _distance(image, periodic, max(image.shape)), np.zeros(image.shape)
+    # Discs are drawn from the largest to the smallest, and each covers the points that are still blank.
+    for halves in range(int(2 * free.max()), 0, -1):
+        radius = halves / 2
+        covered = _distance(free < radius, periodic, halves // 2 + 1) < radius
+        widest[covered & (widest == 0)] = 2 * radius
+    return np.asarray(spacing * np.where(image, widest, 0.0))
+
+
+def _distance(image: np.ndarray, periodic: bool, reach: int) -> np.ndarray:
+    """Return the distance of each pixel from the nearest one that is false, in pixels.
+
+    reach : distance up to which the periodic images of pixels count.
+    """
+    border = reach if periodic else 0
+    whole = distance_transform_edt(np.pad(image, border, mode="wrap" if periodic else "constant"))
+    return np.asarray(whole[tuple(slice(border, border + side) for side in image.shape)])
