@@ -83,12 +83,11 @@ def test_a_contact_ends_at_a_wider_gap_than_it_begins():
     assert cell(parted, lifted).spanning.tolist() == [1, 1]
 
 
-def test_grains_with_a_common_neighbour_are_not_of_different_chains():
-    """A grain rolls over its neighbour to the next grain of the same chain."""
-    rolled = moved(APART, [1, 2, 3], (0, 0, 0))
-    rolled[1] = APART[2] + (2 * R, 0, 0)
-    found = cell(APART, moved(rolled, [0], (9 * UM, 0, 0)))
-    assert found.broken > 0
+def test_a_grain_that_moves_along_its_own_chain_has_not_changed_chains():
+    """Grain 2 moves from grain 6 to grain 5, which was in contact with 6."""
+    found = cell(BESIDE, moved(BESIDE, [2], (0, 0, -2 * R)))
+    assert [2, 5] in found.pairs(1).tolist()
+    assert (found.broken, found.formed) == (2 / 4, 1 / 4)
     assert found.new_links(1).size == 0
     assert found.reattached == 0.0
 
