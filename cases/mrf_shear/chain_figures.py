@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
 
 from tisim.analysis import Mean, nearest_image, periodic_sides
 from tisim.cases.common.csv_tables import csv_text
@@ -100,13 +101,14 @@ def draw_chain(axis: Axes, cell: Followed, frame: int) -> None:
             for k in grains
         ]
         axis.add_collection(PatchCollection(discs, facecolor=colour, edgecolor="white", lw=0.6, zorder=order))
-    for i, j in cell.pairs(frame):
-        if i in chain and j in chain:
-            apart = nearest_image(position[[j]] - position[[i]], sides)[0]
-            ends = np.array([from_middle[i], from_middle[i] + apart]) * MICRONS
-            axis.plot(
-                ends[:, 0], MICRONS * position[i, 2] + ends[:, 2] - ends[0, 2], color="0.1", lw=1.2, zorder=4
-            )
+    pairs, shown = cell.pairs(frame), np.concatenate([chain, joined])
+    # The contacts of the chain.
+    for i, j in pairs[np.isin(pairs, chain).any(axis=1) & np.isin(pairs, shown).all(axis=1)]:
+        apart = nearest_image(position[[j]] - position[[i]], sides)[0]
+        ends = np.array([from_middle[i], from_middle[i] + apart]) * MICRONS
+        axis.plot(
+            ends[:, 0], MICRONS * position[i, 2] + ends[:, 2] - ends[0, 2], color="0.1", lw=1.2, zorder=4
+        )
     half = MICRONS * sides[0, 0] / 2
     axis.set(xlim=(-half, half), ylim=(0, MICRONS * height), aspect="equal", xlabel="x (µm)")
 
@@ -125,6 +127,8 @@ def draw_numbers(axis: Axes, cells: Sequence[Followed], still: Sequence[Followed
         axis.plot(strain, mean, color=colour, label=label)
         axis.fill_between(strain, np.maximum(mean - half, 0.0), mean + half, color=colour, alpha=0.2, lw=0)
     axis.set(xlabel="strain", ylabel="chains side by side", title="chains from raft to raft")
-    axis.set_ylim(bottom=0.0)
-    axis.legend(frameon=False, fontsize=8, loc="lower left")
+    # Room for the legend above the lines.
+    axis.set_ylim(0.0, 1.5 * max(one.spanning.max() for one in cells))
+    axis.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axis.legend(frameon=False, fontsize=8, loc="upper left")
     plain(axis)
