@@ -27,12 +27,12 @@ from tisim.scene.initial_state import Arrays
 
 FRAMES = 100
 """Number of frames of a cell after the start of shear, at equal times."""
-PARTED = 0.25
+CONTACT_ENDS = 0.25
 """Gap between the surfaces of two grains at which their contact has ended, as a fraction of the mean radius.
 A contact begins at CHAINED, which is smaller, so that grains that vibrate do not count as parted."""
-STILL = 1e-4
+UNSHEARED = 1e-4
 """Shear rate and strain of a cell that counts as not sheared, over those of the sheared one."""
-FAR = 4
+CHAINS_APART = 4
 """Smallest number of contacts on the shortest way between two grains of different chains."""
 
 
@@ -104,7 +104,8 @@ class Followed:
         sides = periodic_sides(self.result.scene.domain)
         for position in self.positions:
             close, near = (
-                contacts(position, radius, gap * float(radius.mean()), sides) for gap in (CHAINED, PARTED)
+                contacts(position, radius, gap * float(radius.mean()), sides)
+                for gap in (CHAINED, CONTACT_ENDS)
             )
             old = np.intersect1d(self._code(near), before)
             before = np.union1d(self._code(close), old)
@@ -176,12 +177,12 @@ class Followed:
         """Return the contacts (i < j) in a frame between free grains that were not near each other at the
         start of shear, shape (contacts, 2).
 
-        Near are grains on a way of fewer than FAR contacts between free grains.
+        Near are grains on a way of fewer than CHAINS_APART contacts between free grains.
         """
         new = self._pairs(np.setdiff1d(self._codes[frame], self._codes[0]))
         one, other = new.T
         steps = shortest_path(self._graph(self._between_free(0)), directed=False, unweighted=True)
-        return np.asarray(new[self.free[new].all(axis=1) & (steps[one, other] >= FAR)])
+        return np.asarray(new[self.free[new].all(axis=1) & (steps[one, other] >= CHAINS_APART)])
 
     def changed(self, frame: int = -1) -> np.ndarray:
         """Return which grains have changed chains by a frame: free grains that have lost a contact of the
@@ -224,8 +225,8 @@ class Followed:
 def followed(settings: Mapping[str, Any], starts: int) -> tuple[list[Followed], list[Followed]]:
     """Return followed cells of some settings, which include the shear rate, from a number of starts: sheared,
     and not sheared for the same time."""
-    strain = STILL * settings.get("strain", STRAIN)
-    slow = {"rate": STILL * settings["rate"], "strain": strain, "before": strain / 2}
+    strain = UNSHEARED * settings.get("strain", STRAIN)
+    slow = {"rate": UNSHEARED * settings["rate"], "strain": strain, "before": strain / 2}
     cells = follow([scene(**{**settings, **one}, seed=seed) for one in ({}, slow) for seed in range(starts)])
     return cells[:starts], cells[starts:]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tisim.cases.mrf_shear.chain_figures import chain_table, reattachment_figure
-from tisim.cases.mrf_shear.chains import CHAINED, PARTED, Followed, followed
+from tisim.cases.mrf_shear.chains import CHAINED, CONTACT_ENDS, Followed, followed
 from tisim.cases.mrf_shear.scene import LARGE_RADIUS, LOWER, UPPER, scene
 
 R, UM = LARGE_RADIUS, 1e-6
@@ -75,8 +75,8 @@ def test_contacts_that_return_have_not_lasted():
 
 
 def test_a_contact_ends_at_a_wider_gap_than_it_begins():
-    between = (CHAINED + PARTED) / 2 * R
-    lifted, parted = (moved(APART, [2, 3], (0, 0, gap)) for gap in (between, 1.01 * PARTED * R))
+    between = (CHAINED + CONTACT_ENDS) / 2 * R
+    lifted, parted = (moved(APART, [2, 3], (0, 0, gap)) for gap in (between, 1.01 * CONTACT_ENDS * R))
     assert cell(APART, lifted).unbroken.tolist() == [2, 2]
     assert cell(APART, parted).unbroken.tolist() == [2, 1]
     # It does not begin at the gap at which it does not end.
