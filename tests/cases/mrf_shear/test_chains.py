@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tisim import InputError
 from tisim.cases.mrf_shear.chain_figures import chain_table, reattachment_figure
 from tisim.cases.mrf_shear.chains import CHAINED, CONTACT_ENDS, Followed, followed
+from tisim.cases.mrf_shear.figures import figures
 from tisim.cases.mrf_shear.scene import LARGE_RADIUS, LOWER, UPPER, scene
 
 R, UM = LARGE_RADIUS, 1e-6
@@ -120,6 +122,13 @@ def test_a_table_and_a_figure_of_followed_cells():
     figure = reattachment_figure(cells, cells[:1])
     assert len(figure.axes) == 4
     np.testing.assert_allclose(figure.axes[3].lines[1].get_ydata()[[0, 40, 60]], [2, 1, 0])
+
+
+def test_figures_of_sizes_that_are_not_run_are_refused():
+    with pytest.raises(
+        InputError, match="size must be one of default, polydisperse, which are run; received 'l21'"
+    ):
+        figures("l21", print)
 
 
 @pytest.mark.slow
