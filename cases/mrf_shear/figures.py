@@ -32,8 +32,9 @@ from tisim.plotting.style import empty, letters, plain, si
 
 STARTS = 3
 """Number of starts of each setting."""
-DRAWN = ("default", "polydisperse")
-"""The sizes with figures."""
+DRAWN = {"default": STARTS, "polydisperse": 6}
+"""The sizes with figures, and the number of starts of their flow curves; starts of the mixture also differ in
+their largest grains."""
 KILO = 1e3
 """A kilopascal, Pa."""
 
@@ -48,7 +49,7 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """
     must(size in DRAWN, "size", f"one of {', '.join(DRAWN)}, which are run", size)
     settings = {key: value for key, value in size_named(size, SIZES).scene.items() if key != "rate"}
-    curve = flow_curve(STARTS, progress=progress, settings=settings)
+    curve = flow_curve(DRAWN[size], progress=progress, settings=settings)
     slow = curve.groups[0][0]
     (chained,) = run([magnetised({**settings, "rate": RATES[0]}, slow.scene.seed)])
     sheared, still = followed({**settings, **COMPARED}, STARTS)
