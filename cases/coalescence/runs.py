@@ -76,6 +76,11 @@ class Gathering:
         """Return the fraction of all grains that are in clusters of two or more."""
         return self.coalesced + (0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.some)
 
+    @property
+    def clumped(self) -> float:
+        """Return the fraction of all grains that are outside the asteroid in clusters of more than ten."""
+        return 0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.many
+
 
 @dataclass(frozen=True)
 class CloudRun:
