@@ -12,7 +12,18 @@ from tisim.cases.coalescence.regime import impact_depth, magnetic_depth
 from tisim.cases.coalescence.scene import scale_of, step
 from tisim.cases.common.rubble_pile import Conserved, critical_spin, free_fall, mean_density
 from tisim.cases.spin_up.scene import DEFAULT, NUMBERS
-from tisim.cases.spin_up.stages import DEFORMATION, DISRUPTION, RATES, SEEDS, SpinUp, spin_ups
+from tisim.cases.spin_up.stages import (
+    DEFORMATION,
+    DISRUPTION,
+    ELONGATED,
+    POROSITY,
+    QUICK,
+    RATES,
+    SEEDS,
+    WIDENED,
+    SpinUp,
+    spin_ups,
+)
 
 ROUNDING = 1e-11
 """Largest change of a momentum, relative to the sum of its magnitudes over the grains."""
@@ -27,6 +38,8 @@ def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
     runs = spin_ups(seeds, **DEFAULT)
     yield from of_conservation(runs)
     yield from of_spins(runs)
+    yield from of_shapes(runs)
+    yield from of_densities(runs)
 
 
 def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
@@ -59,6 +72,45 @@ def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
     yield Claim(
         "spin at which it breaks, 1190 minus 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER
     )
+
+
+def of_shapes(runs: Sequence[SpinUp]) -> Iterator[Shown]:
+    """Yield the shapes of piles at the spin at which L21's deformed, beside its widths (section 4.3.2).
+
+    Small piles are not round at rest. Each pile is therefore compared with itself before the spin-up.
+    """
+    for m, spin in DEFORMATION.items():
+        group = [one for one in runs if one.magnetisation == m]
+        when = f"{m:g} A/m, {1e6 * spin:.0f} urad/s:"
+        shapes = np.array(
+            [[step.asteroid.flattening for step in (one.steps[0], one.at(spin))] for one in group]
+        )
+        beside = f"L21: {WIDENED[m]:.2f}" if m in WIDENED else ""
+        yield Shown(f"{m:g} A/m, at rest: width over height", Mean.of(shapes[:, 0]))
+        yield Shown(f"{when} width over height", Mean.of(shapes[:, 1]), beside)
+        yield Shown(
+            f"{when} width over height, over its value at rest", Mean.of(shapes[:, 1] / shapes[:, 0]), beside
+        )
+        axes = np.array([one.at(spin).asteroid.ellipsoid.semi_axes for one in group])
+        for k, name in enumerate(("longest", "intermediate")):
+            beside = "" if m in WIDENED else f"L21: {ELONGATED[k]:.2f}"
+            yield Shown(f"{when} {name} over shortest axis", Mean.of(axes[:, k] / axes[:, 2]), beside)
+
+
+def of_densities(runs: Sequence[SpinUp]) -> Iterator[Shown]:
+    """Yield the porosity of piles at rest, and their density by spin relative to rest (L21 Fig. 4.11).
+
+    As in L21, the volume is the convex hull of the pile, or of its largest fragment.
+    """
+    for m in DEFORMATION:
+        group = [one for one in runs if one.magnetisation == m]
+        densities = np.array([[step.asteroid.density for step in one.steps] for one in group])
+        beside = f"L21: {POROSITY:.3g}" if m == published.MAGNETISATIONS[-1] else ""
+        yield Shown(f"{m:g} A/m: porosity at rest", Mean.of(1 - densities[:, 0] / published.DENSITY), beside)
+        rates = np.array([one.rate for one in group[0].steps])
+        for k in np.flatnonzero(rates > QUICK):
+            ratio = Mean.of(densities[:, k] / densities[:, 0])
+            yield Shown(f"{m:g} A/m, {1e6 * rates[k]:.0f} urad/s: density over density at rest", ratio)
 
 
 def at_least(rates: Sequence[float]) -> np.ndarray:
