@@ -1,7 +1,7 @@
 """Checks of spun-up piles: findings of L21 that piles of few grains reproduce, and relations that hold
 exactly."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -10,17 +10,16 @@ from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.coalescence import published
 from tisim.cases.coalescence.regime import impact_depth, magnetic_depth
 from tisim.cases.coalescence.scene import scale_of, step
-from tisim.cases.common.rubble_pile import Conserved, critical_spin, free_fall, mean_density
+from tisim.cases.common.rubble_pile import Asteroid, Conserved, critical_spin, free_fall, mean_density
 from tisim.cases.spin_up.scene import DEFAULT, NUMBERS
 from tisim.cases.spin_up.stages import (
     DEFORMATION,
+    DEFORMED_SHAPES,
     DISRUPTION,
-    ELONGATED,
     POROSITY,
     QUICK,
     RATES,
     SEEDS,
-    WIDENED,
     SpinUp,
     spin_ups,
 )
@@ -74,27 +73,31 @@ def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
     )
 
 
-def of_shapes(runs: Sequence[SpinUp]) -> Iterator[Shown]:
-    """Yield the shapes of piles at the spin at which L21's deformed, beside its widths (section 4.3.2).
+MEASURES: Mapping[str, Callable[[Asteroid], float]] = {
+    "width over height": lambda pile: pile.flattening,
+    "longest over shortest axis": lambda pile: pile.elongation,
+    "intermediate over shortest axis": lambda pile: float(
+        pile.ellipsoid.semi_axes[1] / pile.ellipsoid.semi_axes[2]
+    ),
+}
+"""Measures of the shape of a pile: from second moments across and along the spin, and from the axes of its
+bounding ellipsoid."""
 
-    Small piles are not round at rest. Each pile is therefore compared with itself before the spin-up.
+
+def of_shapes(runs: Sequence[SpinUp]) -> Iterator[Shown]:
+    """Yield the shapes of piles at the spin at which L21's piles deformed, beside its widths (section 4.3.2).
+
+    Small piles are not round at rest. Each pile is therefore also compared with itself at rest.
     """
     for m, spin in DEFORMATION.items():
         group = [one for one in runs if one.magnetisation == m]
-        when = f"{m:g} A/m, {1e6 * spin:.0f} urad/s:"
-        shapes = np.array(
-            [[step.asteroid.flattening for step in (one.steps[0], one.at(spin))] for one in group]
-        )
-        beside = f"L21: {WIDENED[m]:.2f}" if m in WIDENED else ""
-        yield Shown(f"{m:g} A/m, at rest: width over height", Mean.of(shapes[:, 0]))
-        yield Shown(f"{when} width over height", Mean.of(shapes[:, 1]), beside)
-        yield Shown(
-            f"{when} width over height, over its value at rest", Mean.of(shapes[:, 1] / shapes[:, 0]), beside
-        )
-        axes = np.array([one.at(spin).asteroid.ellipsoid.semi_axes for one in group])
-        for k, name in enumerate(("longest", "intermediate")):
-            beside = "" if m in WIDENED else f"L21: {ELONGATED[k]:.2f}"
-            yield Shown(f"{when} {name} over shortest axis", Mean.of(axes[:, k] / axes[:, 2]), beside)
+        for name, theirs in DEFORMED_SHAPES[m].items():
+            rest = np.array([MEASURES[name](one.steps[0].asteroid) for one in group])
+            spun = np.array([MEASURES[name](one.at(spin).asteroid) for one in group])
+            when, beside = f"{m:g} A/m, {1e6 * spin:.0f} urad/s: {name}", f"L21: {theirs:.2f}"
+            yield Shown(f"{m:g} A/m, at rest: {name}", Mean.of(rest))
+            yield Shown(when, Mean.of(spun), beside)
+            yield Shown(f"{when}, over its value at rest", Mean.of(spun / rest), beside)
 
 
 def of_densities(runs: Sequence[SpinUp]) -> Iterator[Shown]:

@@ -99,9 +99,13 @@ def trend(group: Sequence[Pressed]) -> float:
     return float(page_trend_test(times, method="asymptotic").pvalue)
 
 
-def time_text(time: float) -> str:
-    """Return a time (s) in µs; one that is not reached is longer than SHUT."""
-    return f"{time / MICRO:.0f}" if np.isfinite(time) else f"> {SHUT / MICRO:.0f}"
+def median_text(one: Pressed) -> str:
+    """Return the median time to arrest with its interval, in µs; times that are not reached are longer than
+    SHUT."""
+    middle, low, high = (
+        f"{time / MICRO:.0f}" if np.isfinite(time) else f"> {SHUT / MICRO:.0f}" for time in one.median
+    )
+    return f"{middle} µs" if low == middle == high else f"{middle} µs ({low} to {high})"
 
 
 def report(found: Sequence[Pressed]) -> str:
@@ -112,10 +116,9 @@ def report(found: Sequence[Pressed]) -> str:
     for width in sorted({one.width for one in found}):
         group = of_width(found, width)
         for one in group:
-            middle, low, high = map(time_text, one.median)
             lines.append(
                 f"  {width:g} grains, {one.pressure / KILO:.3g} kPa: arrested {one.arrested}, "
-                f"median {middle} µs ({low} to {high}), {one.left} of the flow left"
+                f"median {median_text(one)}, {one.left} of the flow left"
             )
         lines.append(f"  {width:g} grains: longer at higher pressure, p = {trend(group):.1g}")
     return "\n".join(lines)

@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 
 from tests.cases.valve.test_opens import UM, made_up, opening
-from tisim.cases.valve.arrest_times import PRESSURES, Pressed, by_pressure, picture, report, trend
+from tisim.cases.valve.arrest_times import (
+    PRESSURES,
+    Pressed,
+    by_pressure,
+    median_text,
+    picture,
+    report,
+    trend,
+)
 from tisim.cases.valve.opens import NOMINAL
 
 
@@ -82,8 +90,10 @@ def test_the_text_and_the_picture_of_valves():
     assert len(text) == 1 + 2 * 4
     assert text[1].startswith("  4 grains, 39.1 kPa: arrested 5 of 6 (0.36 to 1.00), median ")
     assert text[2].startswith("  4 grains, 78.2 kPa: arrested 4 of 6 (0.22 to 0.96), median ")
-    assert "(" in text[2]
-    assert "to > 400)" in text[2]
+    assert "to > 400), 0.17" in text[2]
+    # Four of six starts are not arrested, and a median of six has the interval from the first to the sixth.
+    assert "median > 400 µs (" in text[3]
+    assert median_text(pressed([np.nan] * 6)) == "> 400 µs"
     fractions, times = picture(found).axes
     assert [text.get_text() for text in fractions.get_xticklabels()] == ["39", "78", "156"]
     heights = [line.get_ydata() for line in times.lines if len(line.get_ydata()) == 6]
