@@ -28,8 +28,8 @@ DEFORMED_SHAPES = {
     119.0: {"width over height": 1.28},
     1190.0: {"longest over shortest axis": 1.85, "intermediate over shortest axis": 1.21},
 }
-"""L21's shapes after the deformation by magnetisation (A/m), for grains of 100 cm; section 4.3.2. For grains of
-50 cm they are 1.28, 1.27, 1.46 and 1.17."""
+"""L21's shapes after the deformation by magnetisation (A/m), for grains of 100 cm; section 4.3.2. For grains
+of 50 cm they are 1.28, 1.27, 1.46 and 1.17."""
 POROSITY = 0.83
 """L21's porosity at 1190 A/m, for grains of 100 cm; section 4.3.2. For grains of 50 cm it is 0.836."""
 RATES = tuple(1e-4 * k for k in range(1, 10))
