@@ -1,6 +1,6 @@
 """Shapes of asteroids by rotation and magnetisation, beside L21's (Figs 4.3 and 4.4, table 4.2).
 
-    python -m tisim.cases.coalescence.rotations [--starts 6] [--out coalescence_rotations.png]
+    python -m tisim.cases.coalescence.rotations [--starts 4] [--out coalescence_rotations.png]
 
 L21 runs clouds of 50 cm with three rotations. As printed, they fly apart (``regime.py``); read as
 microdegrees per second, they end at 0.22, 0.43 and 0.86 of the critical spin of their asteroids. The clouds
@@ -28,7 +28,7 @@ from tisim.errors import must
 from tisim.plotting.cloud import common
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
 
-ROTATED_STARTS = 6
+ROTATED_STARTS = 4
 """Number of random starts of each rotation and magnetisation."""
 FINE, COARSE = published.DIAMETERS
 """Diameters of L21's grains, m; here they are of the second."""
