@@ -24,7 +24,7 @@ from tisim.scene.initial_state import Arrays
 
 CLOUD_SAMPLES = 25
 """Number of samples of a cloud after the start, at equal intervals."""
-SEEDS = 3
+SEEDS = 10
 """Number of random starts of each magnetisation."""
 T = TypeVar("T")
 CLUMP = 11
