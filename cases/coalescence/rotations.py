@@ -30,8 +30,8 @@ from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, pla
 
 ROTATED_STARTS = 4
 """Number of random starts of each rotation and magnetisation."""
-FINE, COARSE = published.DIAMETERS
-"""Diameters of L21's grains, m; here they are of the second."""
+ROTATED_DIAMETER, CLOUD_DIAMETER = published.DIAMETERS
+"""Diameter of L21's grains in clouds of three rotations, m, and of the grains here."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Rotated:
         return np.array([one.agglomerations[-1].coalesced for one in group])
 
 
-def published_ratio(printed: float, magnetisation: float, diameter: float = FINE) -> float:
+def published_ratio(printed: float, magnetisation: float, diameter: float = ROTATED_DIAMETER) -> float:
     """Return L21's longest over shortest axis (table 4.2); NaN if it has none.
 
     printed : rotation, rad/s. magnetisation : A/m. diameter : of the grains, m.
@@ -72,7 +72,7 @@ def rotation_here(printed: float) -> float:
 
     printed : the rotation of the latter, rad/s; its number is read as microdegrees per second.
     """
-    fine, coarse = (spin_when_packed(1.0, d, published.SPACING) for d in (FINE, COARSE))
+    fine, coarse = (spin_when_packed(1.0, d, published.SPACING) for d in (ROTATED_DIAMETER, CLOUD_DIAMETER))
     return float(np.radians(printed) * fine / coarse)
 
 

@@ -12,7 +12,7 @@ from tisim.cases.coalescence import rotations
 from tisim.cases.coalescence.published import MAGNETISATIONS, ROTATIONS
 from tisim.cases.coalescence.regime import regime
 from tisim.cases.coalescence.rotations import (
-    COARSE,
+    CLOUD_DIAMETER,
     Rotated,
     by_rotation,
     picture,
@@ -38,7 +38,7 @@ def test_the_published_ratios():
     assert published_ratio(2000e-6, 0.0) == pytest.approx(2.0475, abs=1e-4)
     assert published_ratio(1000e-6, 1190.0) == pytest.approx(1.3924, abs=1e-4)
     assert np.isnan(published_ratio(500e-6, 1190.0))
-    assert published_ratio(1000e-6, 0.0, COARSE) == pytest.approx(1.0863, abs=1e-4)
+    assert published_ratio(1000e-6, 0.0, CLOUD_DIAMETER) == pytest.approx(1.0863, abs=1e-4)
 
 
 def flat(seed, magnetisation, layers):
