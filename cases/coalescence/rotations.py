@@ -123,7 +123,7 @@ def report(found: Sequence[Rotated]) -> str:
 def picture(found: Sequence[Rotated]) -> Figure:
     """Draw the asteroids of the first start by rotation and magnetisation, and their axis ratios."""
     figure = empty(12.0, 7.4)
-    drawn, beside = figure.subfigures(1, 2, width_ratios=(1.5, 1))
+    ((drawn, beside),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.5, 1))
     axes = drawn.subplots(len(published.MAGNETISATIONS), len(found), squeeze=False)
     shown = [[of_magnetisation(one.runs, m)[0] for one in found] for m in published.MAGNETISATIONS]
     piles = [[run.asteroid.grains for run in row] for row in shown]
