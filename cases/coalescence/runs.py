@@ -24,7 +24,7 @@ from tisim.scene.initial_state import Arrays
 
 CLOUD_SAMPLES = 25
 """Number of samples of a cloud after the start, at equal intervals."""
-SEEDS = 3
+SEEDS = 10
 """Number of random starts of each magnetisation."""
 T = TypeVar("T")
 CLUMP = 11
@@ -75,6 +75,11 @@ class Gathering:
     def bound(self) -> float:
         """Return the fraction of all grains that are in clusters of two or more."""
         return self.coalesced + (0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.some)
+
+    @property
+    def clumped(self) -> float:
+        """Return the fraction of all grains that are outside the asteroid in clusters of more than ten."""
+        return 0.0 if self.coalesced == 1 else (1 - self.coalesced) * self.many
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Checks of spun-up piles: findings of L21 that piles of few grains reproduce, and relations that hold
 exactly."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -10,9 +10,19 @@ from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.coalescence import published
 from tisim.cases.coalescence.regime import impact_depth, magnetic_depth
 from tisim.cases.coalescence.scene import scale_of, step
-from tisim.cases.common.rubble_pile import Conserved, critical_spin, free_fall, mean_density
+from tisim.cases.common.rubble_pile import Asteroid, Conserved, critical_spin, free_fall, mean_density
 from tisim.cases.spin_up.scene import DEFAULT, NUMBERS
-from tisim.cases.spin_up.stages import DEFORMATION, DISRUPTION, RATES, SEEDS, SpinUp, spin_ups
+from tisim.cases.spin_up.stages import (
+    DEFORMATION,
+    DEFORMED_SHAPES,
+    DISRUPTION,
+    POROSITY,
+    QUICK,
+    RATES,
+    SEEDS,
+    SpinUp,
+    spin_ups,
+)
 
 ROUNDING = 1e-11
 """Largest change of a momentum, relative to the sum of its magnitudes over the grains."""
@@ -27,6 +37,8 @@ def check(seeds: int = SEEDS) -> Iterator[Check | Claim | Shown]:
     runs = spin_ups(seeds, **DEFAULT)
     yield from of_conservation(runs)
     yield from of_spins(runs)
+    yield from of_shapes(runs)
+    yield from of_densities(runs)
 
 
 def of_conservation(runs: Sequence[SpinUp]) -> Iterator[Check]:
@@ -59,6 +71,49 @@ def of_spins(runs: Sequence[SpinUp]) -> Iterator[Claim | Shown]:
     yield Claim(
         "spin at which it breaks, 1190 minus 0 A/m, urad/s (L21: 100)", Mean.of(strong - plain), least=LATER
     )
+
+
+MEASURES: Mapping[str, Callable[[Asteroid], float]] = {
+    "width over height": lambda pile: pile.flattening,
+    "longest over shortest axis": lambda pile: pile.elongation,
+    "intermediate over shortest axis": lambda pile: float(
+        pile.ellipsoid.semi_axes[1] / pile.ellipsoid.semi_axes[2]
+    ),
+}
+"""Measures of the shape of a pile: from second moments across and along the spin, and from the axes of its
+bounding ellipsoid."""
+
+
+def of_shapes(runs: Sequence[SpinUp]) -> Iterator[Shown]:
+    """Yield the shapes of piles at the spin at which L21's piles deformed, beside its widths (section 4.3.2).
+
+    Small piles are not round at rest. Each pile is therefore also compared with itself at rest.
+    """
+    for m, spin in DEFORMATION.items():
+        group = [one for one in runs if one.magnetisation == m]
+        for name, theirs in DEFORMED_SHAPES[m].items():
+            rest = np.array([MEASURES[name](one.steps[0].asteroid) for one in group])
+            spun = np.array([MEASURES[name](one.at(spin).asteroid) for one in group])
+            when, beside = f"{m:g} A/m, {1e6 * spin:.0f} urad/s: {name}", f"L21: {theirs:.2f}"
+            yield Shown(f"{m:g} A/m, at rest: {name}", Mean.of(rest))
+            yield Shown(when, Mean.of(spun), beside)
+            yield Shown(f"{when}, over its value at rest", Mean.of(spun / rest), beside)
+
+
+def of_densities(runs: Sequence[SpinUp]) -> Iterator[Shown]:
+    """Yield the porosity of piles at rest, and their density by spin relative to rest (L21 Fig. 4.11).
+
+    As in L21, the volume is the convex hull of the pile, or of its largest fragment.
+    """
+    for m in DEFORMATION:
+        group = [one for one in runs if one.magnetisation == m]
+        densities = np.array([[step.asteroid.density for step in one.steps] for one in group])
+        beside = f"L21: {POROSITY:.3g}" if m == published.MAGNETISATIONS[-1] else ""
+        yield Shown(f"{m:g} A/m: porosity at rest", Mean.of(1 - densities[:, 0] / published.DENSITY), beside)
+        rates = np.array([one.rate for one in group[0].steps])
+        for k in np.flatnonzero(rates > QUICK):
+            ratio = Mean.of(densities[:, k] / densities[:, 0])
+            yield Shown(f"{m:g} A/m, {1e6 * rates[k]:.0f} urad/s: density over density at rest", ratio)
 
 
 def at_least(rates: Sequence[float]) -> np.ndarray:

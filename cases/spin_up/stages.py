@@ -23,6 +23,15 @@ DEFORMATION = {0.0: 600e-6, 119.0: 600e-6, 1190.0: 700e-6}
 4.3.2."""
 DISRUPTION = {0.0: 700e-6, 119.0: 700e-6, 1190.0: 800e-6}
 """L21's angular velocity (rad/s) at which grains were shed, by magnetisation (A/m); section 4.3.2."""
+DEFORMED_SHAPES = {
+    0.0: {"width over height": 1.39},
+    119.0: {"width over height": 1.28},
+    1190.0: {"longest over shortest axis": 1.85, "intermediate over shortest axis": 1.21},
+}
+"""L21's shapes after the deformation by magnetisation (A/m), for grains of 100 cm; section 4.3.2. For grains
+of 50 cm they are 1.28, 1.27, 1.46 and 1.17."""
+POROSITY = 0.83
+"""L21's porosity at 1190 A/m, for grains of 100 cm; section 4.3.2. For grains of 50 cm it is 0.836."""
 RATES = tuple(1e-4 * k for k in range(1, 10))
 """Successive angular velocities of the pile, rad/s; section 4.3.1 of L21."""
 QUICK = 4e-4
@@ -33,7 +42,7 @@ LOST = 0.05
 """Least fraction of all grains that a disrupted pile has lost. L21 gives no number."""
 DEFORMED = 1.1
 """Least growth factor of the width over height of a deformed pile. L21 gives no number."""
-SEEDS = 3
+SEEDS = 10
 """Number of random starts of each magnetisation."""
 
 

@@ -1,10 +1,9 @@
-"""Does the valve open again? A field begins and ends; pressure, and the fraction of iron, differ.
+"""Does the valve open again? A field begins and ends; the fraction of iron and the pressure on a jam differ.
 
     python -m tisim.cases.valve.opens [--starts 12] [--out valve_opens.png]
 
 L21 calls a valve successful if it jams in a field and flows again without it (section 3.3, table 3.2). It
-measured the time to arrest by pressure (figure 3.8), the pressure that a jammed valve holds (section 3.4.2),
-and three fractions of iron (table 3.2).
+measured three fractions of iron (table 3.2), and the pressure that a jammed valve holds (section 3.4.2).
 """
 
 import argparse
@@ -33,8 +32,6 @@ SHUT, REOPENED = 0.4e-3, 0.3e-3
 FLOWING."""
 NOMINAL = GRADIENT * LENGTH
 """Drag on grains at rest over the cross-section of the small valve, Pa: L21's 100 kPa over the length."""
-HIGHER = 4 * NOMINAL
-"""Pressure at which the time to arrest is measured in addition to NOMINAL, Pa."""
 FRACTIONS = (0.286, 0.45)
 """Volume fractions of iron of L21's mixes in addition to 0.345."""
 RAISED = (1.0, 4.0, 8.0)
@@ -235,13 +232,10 @@ def raised(
     return [[Raised(one.before, factor, next(done)) for one in jams] for factor in factors]
 
 
-def report(
-    found: Reopening, pressed: Sequence[Opening], mixes: Sequence[Sequence[Opening]],
-    jams: Sequence[Sequence[Raised]],
-) -> str:  # fmt: skip
+def report(found: Reopening, mixes: Sequence[Sequence[Opening]], jams: Sequence[Sequence[Raised]]) -> str:
     """Return the numbers as text.
 
-    pressed : starts at HIGHER. mixes : starts of each of FRACTIONS. jams : starts by factor.
+    mixes : starts of each of FRACTIONS. jams : starts by factor.
     """
     lines = ["flow over the flow before the field, at the end of the second and the third phase:"]
     for name, group in found.groups.items():
@@ -262,8 +256,7 @@ def report(
     lines.append(f"arrested {SHUT / MILLI:.1f} ms after the field is switched on:")
     rows = {
         **{f"{fraction:.1%} iron": mix for fraction, mix in zip(FRACTIONS, mixes, strict=True)},
-        f"{published.FRACTION:.1%} iron, {NOMINAL / 1e3:.0f} kPa": found.closed,
-        f"{published.FRACTION:.1%} iron, {HIGHER / 1e3:.0f} kPa": pressed,
+        f"{published.FRACTION:.1%} iron": found.closed,
     }
     for name, group in rows.items():
         times = sorted(one.arrest_time / MICRO for one in group if one.arrested)
@@ -321,9 +314,8 @@ def main() -> None:
     options = parser.parse_args()
     must(options.starts >= 2, "starts", "at least 2, for an interval", options.starts)
     found = three_phases(options.starts)
-    wanted = [{"fraction": fraction} for fraction in FRACTIONS]
-    *mixes, pressed = arrests([*wanted, {"pressure": HIGHER}], options.starts)
-    print(report(found, pressed, mixes, raised(found.closed)))
+    mixes = arrests([{"fraction": fraction} for fraction in FRACTIONS], options.starts)
+    print(report(found, mixes, raised(found.closed)))
     if options.out is not None:
         picture(found).savefig(options.out, dpi=150)
 

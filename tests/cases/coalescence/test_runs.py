@@ -1,5 +1,7 @@
 """Series of states of clouds, and the checks and figures made from them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.constants import G
@@ -62,6 +64,17 @@ def test_claims_about_runs():
     checks = {check.name: check for check in of_conservation(RUNS)}
     # Velocities do not change; only the gravitational energy has decreased.
     assert all(check.ok for check in checks.values())
+
+
+def test_clumps_that_join_the_asteroid_later_count():
+    """Before the end, 12 of 40 grains are in a clump outside an asteroid of 20."""
+    between = Gathering.of(state_of(np.vstack([row(20), row(12, at=(0, 10, 0)), row(8, 5.0, (0, 40, 0))])))
+    runs = [
+        replace(one, agglomerations=[between, one.agglomerations[1]]) if one.magnetisation > 1000 else one
+        for one in RUNS
+    ]
+    most = [item.value.value for item in of_agglomeration(runs) if "largest fraction" in item.name]
+    assert most == pytest.approx([0.0, 0.0, 0.3])
 
 
 @pytest.mark.parametrize(("weak", "strong"), [(2, 0), (0, 0), (0, 2)])
@@ -170,13 +183,13 @@ def test_the_degree_of_agglomeration_of_a_cloud():
     place = np.vstack([row(20), row(12, at=(0, 10, 0)), row(2, at=(0, 20, 0)), single])
     seen = Gathering.of(state_of(place))
     assert (seen.coalesced, seen.some, seen.many) == pytest.approx((20 / 40, 14 / 20, 12 / 20))
-    assert seen.bound == pytest.approx(34 / 40)
+    assert (seen.bound, seen.clumped) == pytest.approx((34 / 40, 12 / 40))
 
 
 def test_the_ends_of_agglomeration():
     apart, whole = Gathering.of(state_of(row(4, 3.0))), Gathering.of(state_of(row(4)))
     assert (apart.coalesced, apart.some, apart.bound) == (0.0, 0.0, 0.0)
-    assert (whole.coalesced, whole.bound) == (1.0, 1.0)
+    assert (whole.coalesced, whole.bound, whole.clumped) == (1.0, 1.0, 0.0)
     assert np.isnan(whole.some)
 
 

@@ -9,7 +9,7 @@ from tests.cases.common.test_rubble_pile import block, state_of
 from tisim import InputError
 from tisim.cases.common.rubble_pile import Asteroid, Conserved
 from tisim.cases.spin_up import stages
-from tisim.cases.spin_up.checks import at_least, of_conservation, of_spins, regime
+from tisim.cases.spin_up.checks import at_least, of_conservation, of_densities, of_shapes, of_spins, regime
 from tisim.cases.spin_up.figures import against_spin, figures, piles, table
 from tisim.cases.spin_up.scene import NUMBERS, SIZES, scene_for
 from tisim.cases.spin_up.stages import DEFORMATION, DISRUPTION, RATES, SpinStep, SpinUp, spin_ups, turn
@@ -99,6 +99,51 @@ def test_the_claim_of_later_breaking_needs_a_difference_of_one_step(when, later)
     ]
     claims = [claim for claim in of_spins(runs) if "1190 minus 0" in claim.name]
     assert [claim.ok for claim in claims] == [later]
+
+
+def slabs(magnetisation):
+    """Two piles: blocks at rest, of which the second is taller, that become a slab two grains high at 600
+    µrad/s."""
+    for seed, tall in enumerate((4, 5)):
+        block = state_of(np.argwhere(np.ones((4, 4, tall))).astype(float))
+        slab = state_of(np.argwhere(np.ones((4, 8, 2))).astype(float))
+        rates = (0.0, 5e-4, 6e-4, 7e-4)
+        states = (block, block, slab, slab)
+        yield SpinUp(magnetisation, seed, [SpinStep(*one) for one in zip(rates, states, strict=True)])
+
+
+SLABS = [one for m in DEFORMATION for one in slabs(m)]
+
+
+def test_widths_are_relative_to_the_pile_at_rest():
+    shown = {item.name: item for item in of_shapes(SLABS)}
+    steps = SLABS[0].steps[0], SLABS[1].steps[0], SLABS[0].steps[2]
+    high, higher, flat = (one.asteroid.flattening for one in steps)
+    assert shown["0 A/m, at rest: width over height"].value.value == pytest.approx((high + higher) / 2)
+    assert shown["0 A/m, 600 urad/s: width over height"].value.value == pytest.approx(flat)
+    growth = shown["119 A/m, 600 urad/s: width over height, over its value at rest"]
+    assert growth.value.value == pytest.approx((flat / high + flat / higher) / 2)
+    assert growth.beside == "L21: 1.28"
+    axes = SLABS[0].steps[2].asteroid.ellipsoid.semi_axes
+    for k, (name, beside) in enumerate((("longest", "L21: 1.85"), ("intermediate", "L21: 1.21"))):
+        axis = shown[f"1190 A/m, 700 urad/s: {name} over shortest axis"]
+        assert (axis.value.value, axis.beside) == (pytest.approx(axes[k] / axes[2]), beside)
+    assert shown["1190 A/m, at rest: longest over shortest axis"].value.value < 1.3
+
+
+def test_porosities_and_densities_are_of_the_hull():
+    """Grains of 1 m with a mass of 2 kg, in place of 1571 kg: the porosity is 1 - 1e-3 and more."""
+    shown = {item.name: item for item in of_densities(SLABS)}
+    at_rest = [one.steps[0].asteroid.density for one in SLABS[:2]]
+    porosity = shown["1190 A/m: porosity at rest"]
+    assert porosity.value.value == pytest.approx(1 - np.mean(at_rest) / 3000)
+    assert porosity.beside == "L21: 0.83"
+    assert shown["0 A/m: porosity at rest"].beside == ""
+    slab = SLABS[0].steps[2].asteroid.density
+    ratio = shown["0 A/m, 600 urad/s: density over density at rest"].value.value
+    assert ratio == pytest.approx(np.mean(slab / np.array(at_rest)))
+    assert shown["0 A/m, 500 urad/s: density over density at rest"].value.value == pytest.approx(1.0)
+    assert sum("over density at rest" in name for name in shown) == 3 * 3
 
 
 @pytest.mark.long

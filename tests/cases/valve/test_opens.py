@@ -118,7 +118,7 @@ def test_three_phases_have_two_controls_from_the_same_starts(monkeypatch):
             np.testing.assert_array_equal(made.particles.position, jam.flow.result.state["position"])
             speed = scene(pressure=factor * NOMINAL).effects[5].speed
             assert made.effects[5].speed == pytest.approx(speed)
-    text = report(found, found.closed, [found.closed, found.closed], jams)
+    text = report(found, [found.closed, found.closed], jams)
     assert "field stays on: 0.0110 ± 0.0025, 0.0110 ± 0.0025; arrested 3 of 3" in text
     assert "4 times, 156 kPa: held 3 of 3" in text
     assert "of those arrested, flow again: 3 of 3 (0.29 to 1.00)" in text
