@@ -24,7 +24,7 @@ ROOMS = (
     "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.streams", "tisim.console",
     "tisim.files",
     "tisim.backend",
-    "tisim.numerics", "tisim.components", "tisim.materials", "tisim.geometry", "tisim.domains",
+    "tisim.numerics", "tisim.components", "tisim.materials", "tisim.geometry", "tisim.shapes", "tisim.domains",
     "tisim.state", "tisim.program", "tisim.packing",
     "tisim.effects.base", "tisim.operators.base", "tisim.pairs", "tisim.forces", "tisim.collisions",
     "tisim.self_consistent", "tisim.population", "tisim.sources",

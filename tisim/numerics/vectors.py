@@ -71,3 +71,42 @@ def random_orientation(u, v, w):
     a, b, p, q = 2.0 * ti.math.pi * v, 2.0 * ti.math.pi * w, ti.sqrt(1.0 - u), ti.sqrt(u)
     x, y, z = p * elementary.sin(a), p * elementary.cos(a), q * elementary.sin(b)
     return ti.Vector([q * elementary.cos(b), x, y, z])
+
+
+@ti.func
+def normal_to(a):
+    """Return a unit vector normal to a unit vector, and to the coordinate axis that is farthest from it."""
+    size, zero, one = ti.abs(a), 0.0 * a[0], 0.0 * a[0] + 1.0
+    first = (size[0] <= size[1]) & (size[0] <= size[2])
+    second = (size[1] <= size[2]) & ~first
+    x, y = ti.select(first, one, zero), ti.select(second, one, zero)
+    return a.cross(ti.Vector([x, y, one - x - y])).normalized()
+
+
+@ti.func
+def turn_between(a, b):
+    """Return the quaternion of the smallest rotation that brings one unit vector onto another.
+
+    With the angle t between them, cos(t/2) = |a + b|/2 and sin(t/2) = |a - b|/2, both without cancellation.
+    The axis is a x b; for opposite vectors, for which it is not defined, any vector normal to a serves.
+    """
+    across = a.cross(b)
+    # By rounding a short product may be inclined to a.
+    across -= across.dot(a) * a
+    size = across.norm()
+    axis = ti.select(size > 0.0, across / ti.select(size > 0.0, size, 1.0), normal_to(a))
+    v = 0.5 * (a - b).norm() * axis
+    return ti.Vector([0.5 * (a + b).norm(), v[0], v[1], v[2]])
+
+
+@ti.func
+def rotation_matrix(q):
+    """Return the 3 x 3 matrix of a unit quaternion; its columns are the rotated coordinate axes."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    return ti.Matrix(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )

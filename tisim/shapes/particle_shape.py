@@ -1,0 +1,90 @@
+"""The contract of particle shapes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from tisim.components.component import Component, Vector
+from tisim.errors import must
+
+HALVINGS = 60
+"""Bisections along a ray, after which its end is on the surface to rounding."""
+
+
+class ParticleShape(Component):
+    """A particle shape is a strictly convex solid, or one that is convex with a smooth surface.
+
+    It is centred at the origin and symmetric under reflection in the three coordinate planes of its body
+    frame, so its principal axes are x, y and z, and its support function is even. Kernels know two families:
+    rods, spheres swept along a segment (``tisim/shapes/rod_pairs.py``), and superquadrics
+    (``tisim/shapes/superquadric_pairs.py``). A sphere belongs to both.
+    """
+
+    contract: ClassVar[bool] = True
+
+    @abstractmethod
+    def volume(self) -> float:
+        """Return the volume (m^3)."""
+
+    @abstractmethod
+    def moments(self) -> np.ndarray:
+        """Return the principal moments of inertia about x, y and z per unit mass (m^2), shape (3,), for a
+        uniform density."""
+
+    @abstractmethod
+    def half_extents(self) -> np.ndarray:
+        """Return half the sides (m) of the smallest box along x, y and z around the shape, shape (3,)."""
+
+    @abstractmethod
+    def bounding_radius(self) -> float:
+        """Return the radius (m) of the smallest sphere around the shape."""
+
+    @abstractmethod
+    def support(self, direction: np.ndarray) -> np.ndarray:
+        """Return the points (m) of the shape that are farthest along directions, shape (..., 3) each. A
+        direction may have any length but 0."""
+
+    @abstractmethod
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Return whether points (m, shape (..., 3)) are inside or on the surface, shape (...)."""
+
+    def rod(self) -> tuple[float, float] | None:
+        """Return half the length of the segment along z and the radius (m) as kernels for rods take them;
+        None if the shape is not a rod."""
+        return None
+
+    def superquadric(self) -> tuple[Vector, Vector] | None:
+        """Return the semi-axes (m) and the exponents as kernels for superquadrics take them; None if the
+        shape is not a superquadric."""
+        return None
+
+    def equal_volume_radius(self) -> float:
+        """Return the radius (m) of the sphere of the same volume."""
+        return float(np.cbrt(0.75 * self.volume() / np.pi))
+
+    def surface_points(self, count: int) -> np.ndarray:
+        """Return points (m) on the surface, shape (count, 3), accurate to rounding.
+
+        They are the points at which rays from the centre leave the shape. The rays go through points of an
+        even spiral on the sphere, scaled by the extents of the shape.
+        """
+        must(count > 0, "count", "greater than 0", count)
+        rank = np.arange(count) + 0.5
+        angle, z = np.pi * (1 + np.sqrt(5)) * rank, 1 - 2 * rank / count
+        across = np.sqrt(1 - z * z)
+        ray = self.half_extents() * np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
+        inside, outside = np.zeros(count), 2 * self.bounding_radius() / np.linalg.norm(ray, axis=-1)
+        for _ in range(HALVINGS):
+            middle = (inside + outside) / 2
+            within = self.contains(middle[:, None] * ray)
+            inside, outside = np.where(within, middle, inside), np.where(within, outside, middle)
+        points: np.ndarray = inside[:, None] * ray
+        return points
+
+
+def positive(name: str, values: Vector) -> None:
+    """Raise InputError unless all components of a vector are greater than 0."""
+    must(all(value > 0 for value in values), name, "three numbers greater than 0", values)
