@@ -41,7 +41,12 @@ class SuperquadricShape(ParticleShape):
     def _is_strictly_convex(self) -> Self:
         positive(f"{self.label}.semi_axes", self.semi_axes)
         allowed = all(2 <= one <= LARGEST_EXPONENT for one in self.exponents)
-        must(allowed, f"{self.label}.exponents", f"three numbers from 2 to {LARGEST_EXPONENT:g}", self.exponents)
+        must(
+            allowed,
+            f"{self.label}.exponents",
+            f"three numbers from 2 to {LARGEST_EXPONENT:g}",
+            self.exponents,
+        )
         return self
 
     def volume(self) -> float:

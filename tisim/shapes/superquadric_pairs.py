@@ -111,7 +111,9 @@ def _start(c, turn, a_i, a_j, start):
     kind, first = (start + 2) // 3, (start + 2) % 3
     if kind == 0:
         square_i, square_j, back = a_i * a_i, a_j * a_j, turn.transpose()
-        rows = [square_i * _unit(c, k) + turn @ (square_j * (back @ _unit(c, k))) for k in ti.static(range(3))]
+        rows = [
+            square_i * _unit(c, k) + turn @ (square_j * (back @ _unit(c, k))) for k in ti.static(range(3))
+        ]
         # By Cramer's rule, without the determinant, which is positive.
         n = c[0] * rows[1].cross(rows[2]) + c[1] * rows[2].cross(rows[0]) + c[2] * rows[0].cross(rows[1])
     elif kind == 1:
