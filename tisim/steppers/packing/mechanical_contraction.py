@@ -109,7 +109,9 @@ class MechanicalContraction(Stepper):
         (bodies,) = context.effects.of(HardBodies)
         overlaps = SumOverlaps(context, bodies)
         shared = overlaps.exported()
-        items = [BeginAttempt(context), *sum_phases(overlaps, shared), ChooseAction(context, bodies)]
+        # Lists may have been lengthened since the last step, and are then empty.
+        items = [*context.update_lists, BeginAttempt(context), *sum_phases(overlaps, shared)]
+        items.append(ChooseAction(context, bodies))
         buffers = [Buffer(shared, "overlaps between chunks", self.kind())]
         if self.method == "original":
             rates = RemovalRates(context, bodies)
@@ -117,7 +119,7 @@ class MechanicalContraction(Stepper):
             items += [ScaleTwist(context, bodies), *sum_phases(rates, memory)]
             buffers.append(Buffer(memory, "removal rates between chunks", self.kind()))
         motion = (BeginStep(context), MoveBodies(context, bodies), Advance(context))
-        return Step((*items, *motion, *context.update_lists), tuple(buffers))
+        return Step((*items, *motion), tuple(buffers))
 
 
 class BeginAttempt(Phase):
@@ -153,7 +155,7 @@ class ChooseAction(Phase):
             s.packing_action[w] = CONTRACT
             s.contractions[w] += 1
             s.attempted[w] = 0
-        elif s.attempted[w] >= self.stepper.attempts or last:
+        elif (s.attempted[w] >= self.stepper.attempts and s.contractions[w] > 0) or last:
             s.packing_action[w] = RETURN
             # The last contraction is taken back.
             volume += s.volume_decrease[w]
