@@ -131,8 +131,8 @@ EFFECTS = {
     "boris": "MagneticField(constant=(0.0, 0.0, 0.1)), Lorentz()",
     "approach_time": IMPACT,
 } | dict.fromkeys(
-    ("brownian", "collocation", "trapezoid", "verlet", "drift_limit", "error_control", "fixed_step",
-     "iteration_control", "stage_control"),
+    ("brownian", "collocation", "langevin", "trapezoid", "verlet", "drift_limit", "error_control",
+     "fixed_step", "iteration_control", "stage_control"),
     "Tether(stiffness=(1.0, 1.0, 2.0))",
 )  # fmt: skip
 """The effects of the scene of each part."""
@@ -140,6 +140,7 @@ COLLOID = "Brownian(temperature=300.0, viscosity=1e-3, control=DriftLimit(longes
 STEPPERS = {
     "brownian": COLLOID,
     "drift_limit": COLLOID,
+    "langevin": "Langevin(temperature=300.0, viscosity=1e-3, control=FixedStep(dt=1e-6))",
     "collocation": "Collocation(control=StageControl(error=1e-6))",
     "stage_control": "Collocation(control=StageControl(error=1e-6))",
     "trapezoid": "Trapezoid(control=ErrorControl(error=1e-6))",

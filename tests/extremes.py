@@ -142,6 +142,10 @@ CONTROLLED = {
         ({"kind": "stage_control"}, {}, (NearField, StokesDrag)),
         ({"kind": "stage_control", "per": "run"}, {}, (Lorentz, MagneticField, Tether)),
     ),
+    "langevin": (
+        ({"kind": "fixed_step", "dt": DT}, {}, (NearField, Tether)),
+        ({"kind": "approach_time"}, {}, (Impact,)),
+    ),
     "brownian": (
         ({"kind": "drift_limit", "longest": DT / 20}, {}, (Tether,)),
         ({"kind": "drift_limit", "longest": DT}, {}, (Mie,)),
@@ -175,7 +179,7 @@ def scenes() -> dict[str, dict[str, Any]]:
     serialization.load(steppers)
     scenes_by_name = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
     for name in sorted(CONTROLLED):
-        fluid = FLUID if name == "brownian" else {}
+        fluid = FLUID if name in ("brownian", "langevin") else {}
         for k, (control, options, effects) in enumerate(CONTROLLED[name]):
             stepper = {"kind": name, **fluid, **options, "control": control}
             scenes_by_name[f"stepper.{name}.{k}"] = _scene(_effects(effects), stepper)

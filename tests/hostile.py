@@ -125,9 +125,10 @@ def valid() -> tuple[dict[str, Any], ...]:
     )
     for start in starts:
         tables_.append({**base.to_dict(), "domain": box, "particles": serialization.to_dict(start)})
-    controls = {"brownian": DriftLimit(longest=1e-9), "boris": FixedStep(dt=1e-9)}
+    step = FixedStep(dt=1e-9)
+    controls = {"brownian": DriftLimit(longest=1e-9), "boris": step, "langevin": step}
     for name, kind in _kinds(Stepper).items():
-        fluid = {"temperature": 300.0, "viscosity": 1e-3} if name == "brownian" else {}
+        fluid = {"temperature": 300.0, "viscosity": 1e-3} if name in ("brownian", "langevin") else {}
         control = {"control": controls[name]} if name in controls else {}
         tables_.append({**base.to_dict(), "stepper": serialization.to_dict(kind(**fluid, **control))})
     return (

@@ -33,6 +33,14 @@ from .gravitation import angular_momentum as angular_momentum
 from .gravitation import gravitational_energy as gravitational_energy
 from .gravitation import virial_ratio as virial_ratio
 from .heap import angle_of_repose as angle_of_repose
+from .magnetisation_curves import LognormalFit as LognormalFit
+from .magnetisation_curves import LognormalRadii as LognormalRadii
+from .magnetisation_curves import RadiusClasses as RadiusClasses
+from .magnetisation_curves import chantrell_radii as chantrell_radii
+from .magnetisation_curves import fit_lognormal_radii as fit_lognormal_radii
+from .magnetisation_curves import fit_radius_classes as fit_radius_classes
+from .magnetisation_curves import lognormal_magnetisation as lognormal_magnetisation
+from .magnetisation_curves import magnetic_radius as magnetic_radius
 from .mean import Mean as Mean
 from .profiles import granular_temperature as granular_temperature
 from .profiles import layer_means as layer_means

@@ -17,6 +17,7 @@ from .implicit.step_control import (
     IterationControl as IterationControl,
 )
 from .implicit.trapezoid import Trapezoid as Trapezoid
+from .langevin import Langevin as Langevin
 from .step_control import (
     ApproachTime as ApproachTime,
 )

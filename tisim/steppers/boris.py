@@ -130,7 +130,9 @@ class BorisRotation(PerParticle):
             if ti.static(self.turning):
                 torque = s.torque[w, i]
             if s.steps[w] > 1:
-                check_step(s, w, i, free, torque, self.turning, self.patient)
+                dt = ti.cast(s.dt[w], s.real)
+                path = dt * s.velocity[w, i].norm()
+                check_step(s, w, i, dt, path, free, torque, self.turning, self.patient)
             s.force_before[w, i] = free
             if ti.static(self.turning):
                 s.torque_before[w, i] = torque

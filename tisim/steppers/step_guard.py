@@ -53,18 +53,18 @@ def guard_fields(effects: Sequence[Effect]) -> tuple[Field, ...]:
 
 
 @ti.func
-def check_step(s, w, i, force, torque, turns: ti.template(), patient: ti.template()):  # type: ignore[valid-type]
-    """Stop the world if dt is beyond 0.45 of the critical step of particle i. The particle has moved by dt v
-    and, if it ``turns``, rotated by dt spin since the last forces; ``force`` (N) and ``torque`` (N m) are the
-    new ones.
+def check_step(s, w, i, dt, path, force, torque, turns: ti.template(), patient: ti.template()):  # type: ignore[valid-type]
+    """Stop the world if dt (s) is beyond 0.45 of the critical step of particle i. The particle has moved by a
+    ``path`` of this length (m) and, if it ``turns``, rotated by dt spin since the last forces; ``force`` (N)
+    and ``torque`` (N m) are the new ones.
 
     The displacement by the new force itself in a step is allowed too, because a field that is switched on, or
     grows in time, changes the force on a particle at rest. patient : whether a single step beyond the limit
     is allowed.
     """
-    dt, radius = ti.cast(s.dt[w], s.real), s.radius[w, i]
+    radius = s.radius[w, i]
     per_force = dt * dt / s.mass[w, i]
-    moved = dt * s.velocity[w, i].norm() + HARDLY * radius
+    moved = path + HARDLY * radius
     bent = per_force * (force - s.force_before[w, i]).norm()
     fails, excess = bent > STEP_LIMIT * moved + per_force * force.norm(), bent / moved
     if ti.static(turns):

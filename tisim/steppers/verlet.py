@@ -139,7 +139,9 @@ class Kick(PerParticle):
                 torque = 0.0 * self.s.force[w, i]
                 if ti.static(self.turning):
                     torque = self.s.torque[w, i]
-                check_step(self.s, w, i, self.s.force[w, i], torque, self.turning, self.patient)
+                dt = ti.cast(self.s.dt[w], self.s.real)
+                path = dt * self.s.velocity[w, i].norm()
+                check_step(self.s, w, i, dt, path, self.s.force[w, i], torque, self.turning, self.patient)
             half_kick(self.s, w, i, self.turning)
 
 

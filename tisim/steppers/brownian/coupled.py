@@ -48,7 +48,7 @@ class BrownianDrift(PerParticle):
                 s.fail_by_force(w, fault(rate), i)
             elif rate > s.steepest[w]:
                 ti.atomic_max(s.steepest[w], rate)
-            velocity = self.fluid.flow(w, i, s.time[w]) + push_velocity
+            velocity = self.fluid.flow(w, s.position[w, i], s.time[w]) + push_velocity
         s.velocity[w, i] = velocity
 
 

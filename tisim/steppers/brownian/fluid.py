@@ -1,4 +1,4 @@
-"""The fluid around Brownian particles: the response of each to forces, flow and heat by itself."""
+"""The fluid around particles that it heats: the response of each to forces, flow and heat by itself."""
 
 import scipy.constants
 
@@ -58,11 +58,11 @@ class Fluid:
         return velocity
 
     @ti.func
-    def flow(self, w, i, t):
-        """Return the velocity (m/s) of the flow at the centre of particle i."""
-        velocity = 0.0 * self.s.velocity[w, i]
+    def flow(self, w, r, t):
+        """Return the velocity (m/s) of the flow at the place r (m)."""
+        velocity = 0.0 * r
         for source in ti.static(self.streams):
-            velocity += source.value(w, self.s.position[w, i], t)
+            velocity += source.value(w, r, t)
         return velocity
 
     @ti.func

@@ -31,7 +31,7 @@ together, in vectors."""
 def euler_step(s, fluid: ti.template(), w, i, mobility, push_velocity, t, dt, g):  # type: ignore[valid-type]
     """Return the drift velocity (m/s), u + F/(6 pi eta R), and the position (m) after a step: r plus
     dt times this velocity + sqrt(2 D dt) g."""
-    velocity = fluid.flow(w, i, t) + push_velocity
+    velocity = fluid.flow(w, s.position[w, i], t) + push_velocity
     width = ti.sqrt(2.0 * dt * fluid.heat(w) * mobility)
     return velocity, s.position[w, i] + (dt * velocity + width * g)
 
