@@ -19,6 +19,8 @@ ORIENTATION = Field("orientation", "", 1, "keep", slots=4)
 """Orientation of a body, a unit quaternion w, x, y, z from its body frame to space."""
 SHAPE = Field("shape", "", 1, "keep", integer=True, minimum=0.0)
 """Index of the shape of a body."""
+DENSEST = 0.75
+"""Packing fraction up to which a box must be wide enough for its bodies."""
 LENGTH_TOLERANCE = 1e-6
 """Tolerance of the length of the quaternions of a start; rounding in single precision is smaller."""
 
@@ -64,7 +66,19 @@ class HardBodies(Pairwise):
         unit = bool((np.abs(lengths - 1) <= LENGTH_TOLERANCE).all())
         must(unit, "particles.orientation", "unit quaternions", float(lengths.max(initial=1.0)))
         last = int(start[SHAPE.name].max(initial=0))
-        must(last < len(self.shapes()), "particles.shape", f"below {len(self.shapes())}, the shapes", last)
+        shapes = self.shapes()
+        must(last < len(shapes), "particles.shape", f"below {len(shapes)}, the shapes", last)
+        low, high = scene.domain.bounds()
+        if low is None or high is None or not len(lengths):
+            return
+        kinds = start[SHAPE.name]
+        sizes = start["radius"] / np.array([one.bounding_radius() for one in shapes])[kinds]
+        volume = float((np.array([one.volume() for one in shapes])[kinds] * sizes**3).sum())
+        # In a box of this density two bodies must not touch on both sides at once.
+        side = float((high - low).min()) * (volume / (DENSEST * float(np.prod(high - low)))) ** (1 / 3)
+        longest = 2 * float(start["radius"].max())
+        rule = f"at least {2 * longest:.4g} m wide at a packing fraction of {DENSEST:g}, twice the length of a body"
+        must(side >= 2 * longest, "box", f"{rule} (take more bodies)", side)
 
     @ti.func
     def size(self, s, w, i):
