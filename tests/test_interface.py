@@ -14,7 +14,7 @@ from tisim.components.component import Component
 from tisim.components.serialization import load
 from tisim.packing import Placement
 
-FAMILIES = ("effects", "geometry", "sources", "operators", "steppers", "packing")
+FAMILIES = ("effects", "geometry", "shapes", "sources", "operators", "steppers", "packing")
 HEAVY = ("taichi", "quadrants", "numpy", "scipy", "pydantic", "h5py", "matplotlib")
 
 

@@ -55,7 +55,7 @@ class Bodies(NamedTuple):
 
 @ti.func
 def _vector(array: ti.template(), m, size: ti.template()):
-    return ti.Vector([array[m, k] for k in ti.static(range(size))])
+    return ti.Vector([ti.cast(array[m, k], float) for k in ti.static(range(size))])
 
 
 @ti.func
@@ -89,11 +89,11 @@ def _rods(c: Array, qi: Array, rod_i: Array, qj: Array, rod_j: Array, out: Array
         gap, normal, x, y = closest_rods(
             _vector(c, m, 3),
             ti.Vector([turn_i[0, 2], turn_i[1, 2], turn_i[2, 2]]),
-            rod_i[m, 0],
-            rod_i[m, 1],
+            ti.cast(rod_i[m, 0], float),
+            ti.cast(rod_i[m, 1], float),
             ti.Vector([turn_j[0, 2], turn_j[1, 2], turn_j[2, 2]]),
-            rod_j[m, 0],
-            rod_j[m, 1],
+            ti.cast(rod_j[m, 0], float),
+            ti.cast(rod_j[m, 1], float),
         )
         _write(out, m, gap, normal, x, y)
 
@@ -101,7 +101,7 @@ def _rods(c: Array, qi: Array, rod_i: Array, qj: Array, rod_j: Array, out: Array
 @ti.kernel
 def _spheres(c: Array, radii: Array, out: Array):
     for m in range(c.shape[0]):
-        gap, normal, x, y = closest_spheres(_vector(c, m, 3), radii[m, 0], radii[m, 1])
+        gap, normal, x, y = closest_spheres(_vector(c, m, 3), *_vector(radii, m, 2))
         _write(out, m, gap, normal, x, y)
 
 
@@ -149,16 +149,16 @@ def unit(vectors):
 
 def random_bodies(rng, count, largest=20.0, aspect=10.0):
     """Superquadrics of volume about 8, with exponents from 2 to ``largest`` and aspect ratios up to
-    ``aspect``: a fifth each of supercuboids, of ellipsoids, of the largest exponent, of equal axes, and of
-    unequal axes and exponents."""
+    ``aspect``: a sixth each of supercuboids, of ellipsoids, of the largest exponent, of equal axes, of
+    spheres, and of unequal axes and exponents."""
     axes = aspect ** rng.uniform(-0.5, 0.5, (count, 3))
     axes /= np.cbrt(axes.prod(axis=1))[:, None]
     exponents = 2 * (largest / 2) ** rng.uniform(0, 1, (count, 3))
-    kind = rng.integers(0, 5, count)
+    kind = rng.integers(0, 6, count)
     exponents[kind == 0] = exponents[kind == 0][:, :1]
-    exponents[kind == 1] = 2.0
+    exponents[(kind == 1) | (kind == 4)] = 2.0
     exponents[kind == 2] = largest
-    axes[kind == 3] = 1.0
+    axes[(kind == 3) | (kind == 4)] = 1.0
     return Bodies(Rotation.random(count, rng=rng), axes, exponents)
 
 

@@ -51,7 +51,9 @@ def test_volume_and_moments_of_unequal_exponents_agree_with_quadrature():
         def height(x, y):
             return a[2] * max(1 - (x / a[0]) ** g[0] - (y / a[1]) ** g[1], 0.0) ** (1 / g[2])
 
-        value, _ = tplquad(lambda z, y, x: weight(x, y, z), 0, a[0], 0, top, 0, height, epsabs=1e-7, epsrel=1e-7)
+        value, _ = tplquad(
+            lambda z, y, x: weight(x, y, z), 0, a[0], 0, top, 0, height, epsabs=1e-7, epsrel=1e-7
+        )
         return 8 * value
 
     volume = integral(lambda x, y, z: 1.0)

@@ -26,7 +26,9 @@ def random_rods(rng, count, aspect=100.0):
     separation = unit(rng.normal(size=(count, 3))) * (most * rng.uniform(0, 1, count) ** 1.5)[:, None]
     # Half of the pairs are close side by side.
     close = rng.random(count) < 0.5
-    across = turn_i.apply(rng.uniform(-1, 1, (count, 3)) * np.stack([other[:, 1] * 2] * 2 + [rods[:, 0]], axis=1))
+    across = turn_i.apply(
+        rng.uniform(-1, 1, (count, 3)) * np.stack([other[:, 1] * 2] * 2 + [rods[:, 0]], axis=1)
+    )
     return np.where(close[:, None], across, separation), turn_i, rods, turn_j, other
 
 
@@ -42,8 +44,9 @@ def check_geometry(contact, separation, turn_i, rod_i, turn_j, rod_j, atol):
         assert (np.abs(on_axis[:, 2]) <= rod[:, 0] + atol).all()
 
 
-def test_rods_touch_at_points_of_both_along_a_common_normal(rng):
-    separation, *pair = random_rods(rng, 100_000)
+@pytest.mark.parametrize("count", [100_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_rods_touch_at_points_of_both_along_a_common_normal(count, rng):
+    separation, *pair = random_rods(rng, count)
     contact = rod_contacts(separation, *pair)
     check_geometry(contact, separation, *pair, atol=1e-12)
     # The normal is across each axis, or at an end of it and outwards.
@@ -63,7 +66,9 @@ def test_the_distance_is_the_least_over_both_segments(rng):
     axes_i, axes_j = turn_i.apply([0, 0, 1]), turn_j.apply([0, 0, 1])
     for m in range(len(separation)):
         limits = np.maximum([rod_i[m, 0], rod_j[m, 0]], 1e-300)
-        found = lsq_linear(np.stack([axes_i[m], -axes_j[m]], axis=1), separation[m], (-limits, limits), tol=1e-14)
+        found = lsq_linear(
+            np.stack([axes_i[m], -axes_j[m]], axis=1), separation[m], (-limits, limits), tol=1e-14
+        )
         least = np.linalg.norm(found.fun)
         assert contact.gap[m] + rod_i[m, 1] + rod_j[m, 1] <= least + 1e-12
         assert contact.gap[m] + rod_i[m, 1] + rod_j[m, 1] == pytest.approx(least, abs=1e-7)
@@ -107,18 +112,19 @@ def test_exchange_and_rotation_change_nothing_but_signs(rng):
     axis = np.stack([turn_i.apply([0, 0, 1]), turn_j.apply([0, 0, 1])])
     distance = contact.gap + rod_i[:, 1] + rod_j[:, 1]
     clear = (np.linalg.norm(np.cross(*axis), axis=1) > 1e-4) & (distance > 1e-4)
-    for sign, moved, back in ((-1, other, Rotation.identity()), (1, rotated, turn.inv())):
-        swapped = Contact(moved.gap, sign * moved.normal, *moved[2:]) if sign > 0 else Contact(
-            moved.gap, -moved.normal, moved.point_j, moved.point_i
-        )  # fmt: skip
-        np.testing.assert_allclose(back.apply(swapped.normal)[clear], contact.normal[clear], atol=1e-9)
-        np.testing.assert_allclose(back.apply(swapped.point_i)[clear], contact.point_i[clear], atol=1e-6)
-        np.testing.assert_allclose(back.apply(swapped.point_j)[clear], contact.point_j[clear], atol=1e-6)
+    swapped = Contact(other.gap, -other.normal, other.point_j, other.point_i)
+    back = Contact(rotated.gap, *(turn.inv().apply(one) for one in rotated[1:]))
+    for moved in (swapped, back):
+        np.testing.assert_allclose(moved.normal[clear], contact.normal[clear], atol=1e-9)
+        np.testing.assert_allclose(moved.point_i[clear], contact.point_i[clear], atol=1e-6)
+        np.testing.assert_allclose(moved.point_j[clear], contact.point_j[clear], atol=1e-6)
 
 
 def contact_of(separation, direction_i, half_i, direction_j, half_j, radius=0.5):
     """The contact of one pair with axes along directions."""
-    turns = [Rotation.align_vectors([unit(np.array(d, float))], [[0, 0, 1]])[0] for d in (direction_i, direction_j)]
+    turns = [
+        Rotation.align_vectors([unit(np.array(d, float))], [[0, 0, 1]])[0] for d in (direction_i, direction_j)
+    ]
     pairs = [Rotation.concatenate([turn]) for turn in turns]
     rods = [np.array([[half, radius]]) for half in (half_i, half_j)]
     contact = rod_contacts(np.array([separation], float), pairs[0], rods[0], pairs[1], rods[1])
@@ -165,7 +171,11 @@ def test_rods_without_a_segment_are_spheres(rng):
     turns = Rotation.random(200, rng=rng), Rotation.random(200, rng=rng)
     zero = np.zeros(200)
     rods = rod_contacts(
-        separation, turns[0], np.stack([zero, radii[:, 0]], axis=1), turns[1], np.stack([zero, radii[:, 1]], axis=1)
+        separation,
+        turns[0],
+        np.stack([zero, radii[:, 0]], axis=1),
+        turns[1],
+        np.stack([zero, radii[:, 1]], axis=1),
     )
     for found, expected in zip(rods, spheres, strict=True):
         np.testing.assert_allclose(found[1:], expected[1:], rtol=0, atol=1e-14)

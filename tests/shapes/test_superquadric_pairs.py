@@ -12,6 +12,7 @@ from tests.shapes.pairs import (
     beside,
     plane_distance,
     random_bodies,
+    rod_contacts,
     searched_gap,
     sphere_contacts,
     superquadric_contacts,
@@ -69,18 +70,19 @@ def test_no_overlapping_pair_fails(count, rng):
 
 
 @pytest.mark.parametrize(
-    ("count", "directions", "kept"), [(100, 500, 6), pytest.param(20_000, 2000, 12, marks=pytest.mark.slow)]
+    ("count", "directions", "kept"), [(100, 500, 6), pytest.param(1_000, 1000, 8, marks=pytest.mark.slow)]
 )
 def test_no_search_without_derivatives_finds_a_larger_distance_of_planes(count, directions, kept, rng):
     """The depth of an overlap is the shortest translation that separates: the largest d over all normals."""
-    for part in range(0, count, 2000):
-        i, j, separation, _, _ = random_pairs(rng, min(2000, count - part), -0.5, 0.05)
+    for part in range(0, count, 500):
+        i, j, separation, _, _ = random_pairs(rng, min(500, count - part), -0.5, 0.05)
         contact = superquadric_contacts(separation, i, j)
         own = plane_distance(contact.normal, separation, i, j)
         np.testing.assert_allclose(own, contact.gap, rtol=0, atol=1e-10)
         searched = searched_gap(rng, separation, i, j, directions, kept)
         assert (searched - contact.gap).max() < 1e-9
-        assert (contact.gap - searched).max() < 1e-3
+        # The search itself stalls on some pairs with kinks, in which d falls steeply to both sides.
+        assert np.quantile(contact.gap - searched, 0.9) < 1e-6
 
 
 def test_gaps_agree_with_the_distance_of_surface_points_by_slsqp(rng):
@@ -104,8 +106,12 @@ def test_gaps_agree_with_the_distance_of_surface_points_by_slsqp(rng):
             return ((separation[m] + turn_j @ x[3:] - turn_i @ x[:3]) ** 2).sum()
 
         towards = [turn.T @ (sign * unit(separation[m])) for sign, turn in ((1, turn_i), (-1, turn_j))]
-        start = np.concatenate([0.6 * axes[0] * n for axes, n in zip((one.axes, other.axes), towards, strict=True)])
-        found = minimize(square, start, constraints=surfaces, method="SLSQP", options={"ftol": 1e-15, "maxiter": 500})
+        start = np.concatenate(
+            [0.6 * axes[0] * n for axes, n in zip((one.axes, other.axes), towards, strict=True)]
+        )
+        found = minimize(
+            square, start, constraints=surfaces, method="SLSQP", options={"ftol": 1e-15, "maxiter": 500}
+        )
         assert np.sqrt(found.fun) == pytest.approx(contact.gap[m], abs=2e-6)
 
 
@@ -145,12 +151,20 @@ def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
     i, j, separation, _, _ = random_pairs(rng, count, -0.3, 0.3, largest=2.0)
     contact = superquadric_contacts(separation, i, j, ellipsoids=True)
     gaps, normals = by_coal(separation, i, j)
-    # For one overlapping pair in some hundred coal gives no answer.
+    # coal gives no answer for one overlapping pair in some hundred, and a larger depth for one in 10,000.
     answered = np.abs(gaps) < 1e300
+    assert (contact.gap - gaps)[answered].min() > -2e-7
+    same = np.abs(contact.gap - gaps) < 2e-7
     assert (~answered).sum() < 0.01 * count
-    np.testing.assert_allclose(gaps[answered], contact.gap[answered], rtol=0, atol=2e-7)
-    turned = np.linalg.norm(np.cross(normals, contact.normal)[answered], axis=1)
-    assert (turned > 5e-3).sum() == 0, turned.max()
+    assert (answered & ~same).sum() < 1e-3 * count
+    turned = np.linalg.norm(np.cross(normals, contact.normal), axis=1)
+    assert turned[contact.gap > 0].max() < 5e-3
+    # Planes of this normal are the gap apart, for every pair. coal loses the normal of a few pairs that
+    # nearly touch, and of deep overlaps with a flat maximum.
+    own, theirs = (plane_distance(one, separation, i, j) for one in (contact.normal, normals))
+    np.testing.assert_allclose(own, contact.gap, rtol=0, atol=1e-10)
+    assert (contact.gap - theirs)[same].min() > -1e-10
+    assert ((contact.gap - theirs)[same] > 1e-4).sum() < 1e-3 * count
 
 
 def test_ellipsoids_have_a_code_path_of_their_own_with_the_same_results(rng):
@@ -158,6 +172,52 @@ def test_ellipsoids_have_a_code_path_of_their_own_with_the_same_results(rng):
     general, own = (superquadric_contacts(separation, i, j, ellipsoids=one) for one in (False, True))
     for one, other in zip(own, general, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e6])
+def test_results_scale_with_lengths(scale, rng):
+    i, j, separation, _, _ = random_pairs(rng, 3000, -0.1, 0.3)
+    contact = superquadric_contacts(separation, i, j)
+    small = superquadric_contacts(
+        scale * separation, *(one._replace(axes=scale * one.axes) for one in (i, j))
+    )
+    np.testing.assert_allclose(small.normal, contact.normal, rtol=0, atol=1e-8)
+    for one, other in zip((small.gap, *small[2:]), (contact.gap, *contact[2:]), strict=True):
+        np.testing.assert_allclose(one / scale, other, rtol=0, atol=1e-8)
+
+
+def errors_in_this_runtime():
+    """Largest errors of gap and normal of pairs of known gap, superquadrics and rods."""
+    rng = np.random.default_rng(2)
+    i, j, separation, normal, gap = random_pairs(rng, 5000, 0.0, 0.3)
+    contact = superquadric_contacts(separation, i, j)
+    turns = [Rotation.random(5000, rng=rng) for _ in range(2)]
+    rods = np.tile([2.0, 0.5], (5000, 1))
+    axes = [turn.apply([0, 0, 1]) for turn in turns]
+    across = unit(np.cross(*axes))
+    along = rng.uniform(-2, 2, (2, 5000, 1))
+    place = along[0] * axes[0] - along[1] * axes[1] + (1 + gap[:, None]) * across
+    rod = rod_contacts(place, turns[0], rods, turns[1], rods)
+    return [
+        float(np.abs(contact.gap - gap).max()),
+        float(np.linalg.norm(np.cross(contact.normal, normal), axis=1).max()),
+        float(np.abs(rod.gap - gap).max()),
+        float(np.linalg.norm(np.cross(rod.normal, across), axis=1).max()),
+    ]
+
+
+def test_errors_in_single_precision_are_those_of_its_input(single):
+    """Inputs are rounded to f32; the gap follows to a part in 1e6 of the separation, and a normal to the
+    rounding divided by the smallest radius of curvature."""
+    gap, _, rod, turned = single("shapes.test_superquadric_pairs", "errors_in_this_runtime")
+    assert gap < 1e-5
+    assert rod < 1e-5
+    assert turned < 1e-3
+
+
+def test_fast_arithmetic_gives_the_same_to_rounding(in_fast_arithmetic):
+    errors = in_fast_arithmetic("shapes.test_superquadric_pairs", "errors_in_this_runtime")
+    assert max(errors) < 1e-9
 
 
 def test_spheres_are_superquadrics_of_equal_axes(rng):
@@ -215,7 +275,7 @@ def test_near_cubes_face_to_face_have_the_normal_of_the_face(rng):
 
 @pytest.mark.parametrize("exponent", [2.0, 3.0, 8.0, 20.0])
 def test_concentric_bodies_have_a_defined_depth_and_normal(exponent):
-    """The depth of two equal bodies is their least width, for boxes and ellipsoids along the shortest axis."""
+    """The depth of two equal bodies is their least width, along the shortest axis."""
     i = boxes(1, exponent, (1.0, 0.5, 2.0))
     contact = superquadric_contacts(np.zeros((1, 3)), i, i)
     assert contact.gap[0] == pytest.approx(-1.0, abs=1e-9)

@@ -74,13 +74,19 @@ def random_orientation(u, v, w):
 
 
 @ti.func
-def normal_to(a):
-    """Return a unit vector normal to a unit vector, and to the coordinate axis that is farthest from it."""
+def farthest_axis(a):
+    """Return the coordinate axis at the largest angle to a vector, without a branch."""
     size, zero, one = ti.abs(a), 0.0 * a[0], 0.0 * a[0] + 1.0
     first = (size[0] <= size[1]) & (size[0] <= size[2])
     second = (size[1] <= size[2]) & ~first
     x, y = ti.select(first, one, zero), ti.select(second, one, zero)
-    return a.cross(ti.Vector([x, y, one - x - y])).normalized()
+    return ti.Vector([x, y, one - x - y])
+
+
+@ti.func
+def normal_to(a):
+    """Return a unit vector normal to a unit vector."""
+    return a.cross(farthest_axis(a)).normalized()
 
 
 @ti.func

@@ -10,7 +10,7 @@ import numpy as np
 from tisim.components.component import Component, Vector
 from tisim.errors import must
 
-HALVINGS = 60
+BISECTIONS = 60
 """Bisections along a ray, after which its end is on the surface to rounding."""
 
 
@@ -77,7 +77,7 @@ class ParticleShape(Component):
         across = np.sqrt(1 - z * z)
         ray = self.half_extents() * np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
         inside, outside = np.zeros(count), 2 * self.bounding_radius() / np.linalg.norm(ray, axis=-1)
-        for _ in range(HALVINGS):
+        for _ in range(BISECTIONS):
             middle = (inside + outside) / 2
             within = self.contains(middle[:, None] * ray)
             inside, outside = np.where(within, middle, inside), np.where(within, outside, middle)

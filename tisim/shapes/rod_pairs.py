@@ -2,7 +2,7 @@
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
-from tisim.numerics.vectors import normal_to
+from tisim.numerics.vectors import farthest_axis
 
 CROSSING = 1e-6
 """Axes that cross at a distance below this part of their lengths take their normal from the product of their
@@ -66,10 +66,9 @@ def closest_rods(separation, axis_i, half_i, radius_i, axis_j, half_j, radius_j)
     size = k.norm()
     inner = (ti.abs(on_i) < half_i) & (ti.abs(on_j) < half_j)
     crossing = inner & (square > CROSSING * CROSSING) & (size < CROSSING * (half_i + half_j))
-    sine = ti.sqrt(ti.select(crossing, square, 1.0))
     side = ti.select(across.dot(separation) < 0.0, -1.0, 1.0)
-    nearest = ti.select(size > 0.0, k / ti.select(size > 0.0, size, 1.0), normal_to(axis_i))
-    normal = ti.select(crossing, side / sine * across, nearest)
+    along = ti.select(crossing, side * across, ti.select(size > 0.0, k, axis_i.cross(farthest_axis(axis_i))))
+    normal = 1.0 / along.norm() * along
     return (
         size - radius_i - radius_j,
         normal,

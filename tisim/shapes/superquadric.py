@@ -12,11 +12,11 @@ from tisim.components.component import Vector, parameter
 from tisim.errors import must
 from tisim.shapes.particle_shape import ParticleShape, positive
 
-LARGEST_EXPONENT = 20.0
+SHARPEST_EXPONENT = 20.0
 """Up to this exponent the narrow phase is tested; a superball of exponent 20 fills 97 % of its cube."""
-ROUND = 1e-8
+NEAR_TWO = 1e-8
 """Exponents closer to 2 count as 2 in the bounding radius, which then is right to a part in 1e8."""
-ROUNDS = 100
+ROOT_ROUNDS = 100
 """Largest number of Newton iterations for the root of a sum of powers; up to ten are usual."""
 
 
@@ -26,7 +26,7 @@ class SuperquadricShape(ParticleShape):
         |x/a_1|^g_1 + |y/a_2|^g_2 + |z/a_3|^g_3 = 1                                          (4.3)
         V = a_1 a_2 a_3 e_1 e_2 e_3 G(e_1/2) G(e_2/2) G(e_3/2) / G(1 + e_1/2 + e_2/2 + e_3/2)    (4.21)
 
-    with e_k = 2/g_k, and the gamma function G. The moments of inertia are (4.29) to (4.31) divided by the
+    with e_k = 2/g_k, and Euler's function G(n + 1) = n!. The moments of inertia are (4.29) to (4.31) over the
     volume. The bounding radius of equal exponents g > 2 is
 
         r = (a_1^q + a_2^q + a_3^q)^(1/q),    q = 2 g/(g - 2)                                 (4.38)
@@ -40,13 +40,9 @@ class SuperquadricShape(ParticleShape):
     @model_validator(mode="after")
     def _is_strictly_convex(self) -> Self:
         positive(f"{self.label}.semi_axes", self.semi_axes)
-        allowed = all(2 <= one <= LARGEST_EXPONENT for one in self.exponents)
-        must(
-            allowed,
-            f"{self.label}.exponents",
-            f"three numbers from 2 to {LARGEST_EXPONENT:g}",
-            self.exponents,
-        )
+        allowed = all(2 <= one <= SHARPEST_EXPONENT for one in self.exponents)
+        rule = f"three numbers from 2 to {SHARPEST_EXPONENT:g}"
+        must(allowed, f"{self.label}.exponents", rule, self.exponents)
         return self
 
     def volume(self) -> float:
@@ -75,7 +71,7 @@ class SuperquadricShape(ParticleShape):
         derivative is a_k^2. If m is below the largest of these, that axis takes the rest of the sum.
         """
         square, g = np.square(self.semi_axes), np.array(self.exponents)
-        sharp = g > 2 + ROUND
+        sharp = g > 2 + NEAR_TWO
         log_m = -np.inf
         if sharp.any():
             powers, logs = g[sharp] / (g[sharp] - 2), np.log(2 * square / g)[sharp]
@@ -118,7 +114,7 @@ def power_sum_root(powers: np.ndarray, logs: np.ndarray) -> np.ndarray:
     method from there converges monotonically.
     """
     t: np.ndarray = logs.max(axis=-1)
-    for _ in range(ROUNDS):
+    for _ in range(ROOT_ROUNDS):
         terms = powers * (logs - t[..., None])
         value = logsumexp(terms, axis=-1)
         share = np.exp(terms - value[..., None])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from tests.compare import same_arrays
@@ -37,13 +37,10 @@ def scene(shape, number, fraction=0.05, seed=0, duration=1000.0, **settings):
 
 
 def contact(separation, axis_i, axis_j, half, radius):
-    """Overlap, normal from i to j, and points of contact of two rods, by minimisation."""
-    best = minimize(
-        lambda x: np.sum((separation + x[1] * axis_j - x[0] * axis_i) ** 2),
-        [0.0, 0.0],
-        bounds=[(-half, half)] * 2,
-        options={"ftol": 1e-30, "gtol": 1e-14},
-    )
+    """Overlap, normal from i to j, and points of contact of two rods, by least squares within bounds."""
+    # Both ends lie on segments: least squares within bounds, by an active set, which is exact.
+    axes = np.stack([axis_i, -axis_j], axis=1)
+    best = lsq_linear(axes, separation, (-half - 1e-300, half + 1e-300), method="bvls", tol=1e-15)
     a, b = best.x
     apart = separation + b * axis_j - a * axis_i
     distance = np.linalg.norm(apart)
@@ -100,10 +97,10 @@ def test_an_attempt_equals_its_reference(method):
         places, orientations = attempt(before, side, ROD, method)
         simulation.run(steps=1)
         after = {name: np.array(simulation.state[name]) for name in before}
-        np.testing.assert_allclose(after["position"], places, rtol=0, atol=2e-8)
+        np.testing.assert_allclose(after["position"], places, rtol=0, atol=1e-10)
         found = Rotation.from_quat(after["orientation"], scalar_first=True).as_matrix()
         # The axis alone: a rotation about it moves nothing.
-        np.testing.assert_allclose(found[:, :, 2], orientations[:, :, 2], rtol=0, atol=2e-8)
+        np.testing.assert_allclose(found[:, :, 2], orientations[:, :, 2], rtol=0, atol=1e-10)
         moved = max(moved, np.abs(after["position"] - before["position"]).max())
     assert moved > 0.01
     simulation.close()
@@ -169,13 +166,31 @@ def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
 
 def test_other_effects_and_domains_are_refused():
     made = scene(ROD, 100)
+    parts = {name: getattr(made, name) for name in ("particles", "effects", "domain", "duration", "stepper")}
+    flat = Box(low=(0, 0, 0), high=made.domain.high, periodic=(True, True, False))
     for change, message in (
         ({"effects": [*made.effects, Gravity()]}, "effects.gravity must be hard bodies alone"),
-        ({"domain": Box(low=(0, 0, 0), high=made.domain.high, periodic=(True, True, False))}, "a periodic box"),
-        ({"effects": []}, "effects must be one with hard bodies"),
+        ({"domain": flat}, "domain must be a periodic box for mechanical_contraction; received 'box'"),
+        ({"effects": [Gravity()]}, "effects must be one with hard bodies for mechanical_contraction"),
     ):
         with pytest.raises(InputError, match=message):
-            made.replace(change)
+            Scene(**{**parts, **change})
+
+
+def test_a_box_must_be_wide_enough_at_the_highest_density():
+    with pytest.raises(InputError, match=r"box must be at least 5 m wide at a packing fraction of 0.75"):
+        run(scene(ROD, 40))
+
+
+def test_quaternions_and_shapes_of_a_start_are_checked():
+    made = scene(ROD, 100)
+    for name, value, message in (
+        ("orientation", np.full((100, 4), 1.0), "particles.orientation must be unit quaternions"),
+        ("shape", np.full(100, 1), "particles.shape must be below 1, the shapes"),
+    ):
+        start = made.start() | {name: value}
+        with pytest.raises(InputError, match=message):
+            made.effects[0].check_start(start, made)
 
 
 def test_orientations_of_a_start_are_random_unless_given():
