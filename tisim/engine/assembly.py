@@ -14,12 +14,12 @@ from tisim.effects.base import (
     DerivedQuantity,
     Effect,
     Force,
+    HardBodies,
     LongRange,
     PairEvent,
     PairForce,
     SelfConsistentQuantity,
 )
-from tisim.effects.hard.hard_bodies import HardBodies
 from tisim.forces.failure_attribution import FailureAttribution
 from tisim.forces.force_sum import (
     AdvanceParticles,

@@ -15,8 +15,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.domains.domain import Domain
-from tisim.effects.base import Constraint, Pairwise
-from tisim.effects.hard.hard_bodies import HardBodies
+from tisim.effects.base import Constraint, HardBodies, Pairwise
 from tisim.numerics.ieee import far_away
 from tisim.pairs.cell_grid import LEVELS, OfGrid, OfParticles
 from tisim.pairs.cell_phases import cell_phases, measure_phases

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from tests.compare import same_arrays
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Gravity
-from tisim.effects.hard.hard_rods import HardRods
+from tisim.effects.contact.hard_rods import HardRods
 from tisim.engine.checkpoint import restore, save
 from tisim.shapes import SpherocylinderShape
 from tisim.steppers.packing.mechanical_contraction import MechanicalContraction

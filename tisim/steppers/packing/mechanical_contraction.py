@@ -7,8 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option, parameter
-from tisim.effects.base import Effect, SceneParts
-from tisim.effects.hard.hard_bodies import HardBodies
+from tisim.effects.base import Effect, HardBodies, SceneParts
 from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.numerics.vectors import product
@@ -18,11 +17,18 @@ from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import BeginStep, apply_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
-from tisim.steppers.packing.overlaps import CLOSEST, PUSH, RATE, TWIST, RemovalRates, SumOverlaps
-from tisim.steppers.step_control import FixedStep
+from tisim.steppers.packing.overlaps import (
+    INVERSE_OVERLAP,
+    OVERLAP_PUSH,
+    OVERLAP_TWIST,
+    REMOVAL_RATE,
+    RemovalRates,
+    SumOverlaps,
+)
+from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 from tisim.steppers.verlet import Advance
 
-ACCEPTED = (
+ACCEPTED_FIELDS = (
     Field("accepted_position", "m", 3, "keep", default="position", scratch=True),
     Field("accepted_orientation", "", 1, "keep", slots=4, scratch=True),
     Field("accepted_radius", "m", 1, "keep", default="radius", scratch=True),
@@ -32,9 +38,17 @@ MOVE, CONTRACT, RETURN = 0, 1, 2
 """What a step does: remove overlaps, contract a configuration without overlaps, or return to the last one."""
 
 
+class Attempts(FixedStep):
+    """A step is one attempt to remove the overlaps of a packing, and takes a time without physical
+    meaning."""
+
+    dt: float = parameter("s", "time of an attempt", 1.0, ge=SHORTEST_STEP)
+
+
 class MechanicalContraction(Stepper):
-    """The mechanical contraction method packs hard bodies at random: it contracts the system in small steps
-    and removes the overlaps after each, until that fails.
+    """Mechanical contraction packs hard bodies: it contracts the system until overlaps remain.
+
+    After each small contraction it tries to remove the overlaps by moving and turning bodies:
 
         v_i = (lambda m_i)^-1 sum_j n_ij,    omega_i = (lambda I_i)^-1 sum_j r_ij x n_ij,
         r_i += dt delta_i v_i                                                     (3.6)-(3.12), revised
@@ -56,7 +70,7 @@ class MechanicalContraction(Stepper):
     Source: B16 chapters 2 and 3; S. R. Williams, A. P. Philipse, Phys. Rev. E 67 (2003) 051301.
     """
 
-    control: FixedStep = option("time of an attempt", FixedStep(dt=1.0))
+    control: Attempts = option("time of an attempt", Attempts())
     method: Literal["revised", "original"] = option("the way in which bodies are moved", "revised")
     volume_step: float = parameter("D^3", "first step by which the volume decreases", 0.1, gt=0)
     halvings: int = option("how often the step of the volume is halved before a world ends", 4, ge=0)
@@ -95,7 +109,13 @@ class MechanicalContraction(Stepper):
         return False
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
-        return (PUSH, TWIST, CLOSEST, *((RATE,) if self.method == "original" else ()), *ACCEPTED)
+        return (
+            OVERLAP_PUSH,
+            OVERLAP_TWIST,
+            INVERSE_OVERLAP,
+            *((REMOVAL_RATE,) if self.method == "original" else ()),
+            *ACCEPTED_FIELDS,
+        )
 
     @ti.func
     def weight(self, depth):

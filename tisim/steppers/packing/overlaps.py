@@ -10,13 +10,13 @@ from tisim.state.bound import Bound
 from tisim.state.fields import Field
 from tisim.steppers.context import StepContext
 
-PUSH = Field("overlap_push", "", 3, "keep", scratch=True)
+OVERLAP_PUSH = Field("overlap_push", "", 3, "keep", scratch=True)
 """Sum of the weighted normals of the overlaps of a body, away from the others."""
-TWIST = Field("overlap_twist", "", 3, "keep", scratch=True)
+OVERLAP_TWIST = Field("overlap_twist", "", 3, "keep", scratch=True)
 """Sum of the moments of these normals, with arms in units of D."""
-CLOSEST = Field("inverse_overlap", "1/m", 1, "keep", scratch=True)
+INVERSE_OVERLAP = Field("inverse_overlap", "1/m", 1, "keep", scratch=True)
 """1 over the smallest overlap of a body; 0 for a body without overlaps."""
-RATE = Field("removal_rate", "1/s", 1, "keep", scratch=True)
+REMOVAL_RATE = Field("removal_rate", "1/s", 1, "keep", scratch=True)
 """Largest speed at which the motion of a body removes an overlap, over the overlap."""
 
 

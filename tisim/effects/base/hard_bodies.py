@@ -9,17 +9,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Field, SceneParts
+from tisim.effects.base.effect import SceneParts
 from tisim.effects.base.pairwise import Pairwise
 from tisim.errors import must
 from tisim.numerics.vectors import rotated
 from tisim.shapes.particle_shape import ParticleShape
+from tisim.state.fields import Field
 
 ORIENTATION = Field("orientation", "", 1, "keep", slots=4)
 """Orientation of a body, a unit quaternion w, x, y, z from its body frame to space."""
 SHAPE = Field("shape", "", 1, "keep", integer=True, minimum=0.0)
 """Index of the shape of a body."""
-DENSEST = 0.75
+DENSEST_PACKING = 0.75
 """Packing fraction up to which a box must be wide enough for its bodies."""
 LENGTH_TOLERANCE = 1e-6
 """Tolerance of the length of the quaternions of a start; rounding in single precision is smaller."""
@@ -75,10 +76,13 @@ class HardBodies(Pairwise):
         sizes = start["radius"] / np.array([one.bounding_radius() for one in shapes])[kinds]
         volume = float((np.array([one.volume() for one in shapes])[kinds] * sizes**3).sum())
         # In a box of this density two bodies must not touch on both sides at once.
-        side = float((high - low).min()) * (volume / (DENSEST * float(np.prod(high - low)))) ** (1 / 3)
+        side = float((high - low).min()) * (volume / (DENSEST_PACKING * float(np.prod(high - low)))) ** (
+            1 / 3
+        )
         longest = 2 * float(start["radius"].max())
-        rule = f"at least {2 * longest:.4g} m wide at a packing fraction of {DENSEST:g}, twice the length of a body"
-        must(side >= 2 * longest, "box", f"{rule} (take more bodies)", side)
+        wide = f"at least {2 * longest:.4g} m wide at a packing fraction of {DENSEST_PACKING:g}"
+        rule = f"{wide}, twice the length of a body (take more bodies)"
+        must(side >= 2 * longest, "box", rule, side)
 
     @ti.func
     def size(self, s, w, i):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
-from tisim.effects.hard.hard_bodies import HardBodies
+from tisim.effects.base import HardBodies
 from tisim.numerics.vectors import rotated
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.rod_pairs import closest_rods
