@@ -30,6 +30,7 @@ RANGES = {
     "granular": (0.97, 1.01),
     "hertz": (0.97, 1.01),
     "mie": (0.98, 1.6),
+    "morse": (0.97, 1.4),
     "near_field": (0.2, 2.0),
     "self_gravity": (1.0, 4.0),
     "softened_self_gravity": (0.0, 0.4),

@@ -63,6 +63,7 @@ EFFECTS = {
     "magnetic_body_force": f"{MAGNET}, MagneticBodyForce(gamma=1e-4)",
     "magnetophoresis": f"{MAGNET}, {SOFT}, Magnetophoresis()",
     "mie": "Mie(epsilon=1e-8, cutoff=2.0)",
+    "morse": "Morse(depth=1e-8, alpha=1e4, cutoff=2.0)",
     "mutual_froehlich_moment": f"{FIELD}, MutualFroehlichMoment(susceptibility=10.0, saturation=1e6)",
     "mutual_induced_moment": f"{FIELD}, MutualInducedMoment(susceptibility=1.0)",
     "mutual_langevin_moment": f"{FIELD}, MutualLangevinMoment(temperature=300.0)",

@@ -87,6 +87,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "contact_softening": {"reference_temperature": 300.0, "floor": 1e3},
     "hertz": {"young": 1e7, "poisson": 0.3},
     "mie": {"epsilon": 4e-21, "cutoff": 2.0},
+    "morse": {"depth": 4e-21, "alpha": 1e4, "cutoff": 2.0},
     "near_field": {"alpha1": 1e-6, "alpha2": 1e-9},
     "truncated_near_field": {"alpha1": 1e-6, "alpha2": 1e-9},
     "tether": {"stiffness": [1.0, 1.0, 2.0]},

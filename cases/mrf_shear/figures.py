@@ -10,7 +10,19 @@ from matplotlib.figure import Figure
 from tisim import Result, run
 from tisim.cases.case import size_named
 from tisim.cases.mrf_shear import published
-from tisim.cases.mrf_shear.flow_curve import Curve, by_field, by_part, flow_curve, magnetised, paired, table
+from tisim.cases.mrf_shear.chain_figures import chain_table, reattachment_figure
+from tisim.cases.mrf_shear.chains import followed
+from tisim.cases.mrf_shear.flow_curve import (
+    COMPARED,
+    Curve,
+    by_field,
+    by_part,
+    flow_curve,
+    magnetised,
+    paired,
+    table,
+    yield_table,
+)
 from tisim.cases.mrf_shear.measures import order
 from tisim.cases.mrf_shear.scene import RATES, SIZES
 from tisim.engine.batches import Progress
@@ -20,24 +32,41 @@ from tisim.plotting.style import empty, letters, plain, si
 
 STARTS = 3
 """Number of starts of each setting."""
+DRAWN = {"default": STARTS, "polydisperse": 6}
+"""The sizes with figures, and the number of starts of their flow curves; starts of the mixture also differ in
+their largest grains."""
 KILO = 1e3
 """A kilopascal, Pa."""
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
-    """flow_curve.png, flow_curve.csv, field.csv: stress by shear rate, by field and by part of the model;
-    chains.png: grains before, in the field, and sheared."""
-    must(not size_named(size, SIZES).scene, "size", "default, which is run", size)
-    curve = flow_curve(STARTS, progress=progress)
-    fields, parts = by_field(STARTS), by_part(STARTS)
+    """Figures and tables of a size, "default" or "polydisperse", by file name.
+
+    - flow_curve.csv, yield_stress.csv: stress by shear rate, and the yield stress of Bingham's law.
+    - chains.png: grains before, in the field, and sheared.
+    - reattachment.png, chains.csv: chains that are followed while they are sheared.
+    - flow_curve.png, field.csv, of the default size: stress also by field and by part of the model.
+    """
+    must(size in DRAWN, "size", f"one of {', '.join(DRAWN)}, which are run", size)
+    settings = {key: value for key, value in size_named(size, SIZES).scene.items() if key != "rate"}
+    curve = flow_curve(DRAWN[size], progress=progress, settings=settings)
     slow = curve.groups[0][0]
-    (chained,) = run([magnetised({"rate": RATES[0]}, slow.scene.seed)])
-    return {
-        "flow_curve.png": stress_figure(curve, fields, parts),
+    (chained,) = run([magnetised({**settings, "rate": RATES[0]}, slow.scene.seed)])
+    sheared, still = followed({**settings, **COMPARED}, STARTS)
+    drawn: dict[str, Figure | str] = {
         "flow_curve.csv": table(curve, "shear_rate_per_s"),
-        "field.csv": table(fields, "flux_density_T"),
+        "yield_stress.csv": yield_table(curve),
+        "chains.csv": chain_table(sheared, still),
         "chains.png": chain_figure(chained, slow),
+        "reattachment.png": reattachment_figure(sheared, still),
     }
+    if size == "default":
+        fields, parts = by_field(STARTS), by_part(STARTS)
+        drawn |= {
+            "flow_curve.png": stress_figure(curve, fields, parts),
+            "field.csv": table(fields, "flux_density_T"),
+        }
+    return drawn
 
 
 def stress_figure(curve: Curve, fields: Curve, parts: Mapping[str, Sequence[Result]]) -> Figure:

@@ -7,6 +7,7 @@ figures.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -95,9 +96,15 @@ class Curve:
         return Mean.of([np.polyfit(x, np.log(start), 1)[0] for start in self.of_starts.T])
 
 
-def flow_curve(starts: int, rates: Sequence[float] = RATES, progress: Progress | None = None) -> Curve:
-    """Return the stress by shear rate, with one world for each rate and start in one batch."""
-    groups = cells([{"rate": rate} for rate in rates], starts, progress)
+def flow_curve(
+    starts: int,
+    rates: Sequence[float] = RATES,
+    progress: Progress | None = None,
+    settings: Settings = MappingProxyType({}),
+) -> Curve:
+    """Return the stress by shear rate, with one world for each rate and start in one batch; settings : the
+    others."""
+    groups = cells([{**settings, "rate": rate} for rate in rates], starts, progress)
     return Curve(np.array([shear_rate(group[0]) for group in groups]), groups)
 
 
@@ -123,6 +130,15 @@ def table(curve: Curve, heading: str) -> str:
         each = " ".join(f"{one:.5g}" for one in starts)
         rows.append([f"{x:.6g}", f"{mean.value:.5g}", f"{mean.half:.3g}", each])
     return csv_text(rows)
+
+
+def yield_table(curve: Curve) -> str:
+    """Return the yield stress of the Bingham fluid fitted to a flow curve as CSV: its mean, half of its
+    interval, and the yield stress of each start."""
+    each = curve.yield_stresses()
+    mean = Mean.of(each)
+    row = [f"{mean.value:.5g}", f"{mean.half:.3g}", " ".join(f"{one:.5g}" for one in each)]
+    return csv_text([["yield_stress_Pa", "half_interval_Pa", "of_each_start_Pa"], row])
 
 
 def cells(settings: Sequence[Settings], starts: int, progress: Progress | None = None) -> list[list[Result]]:

@@ -16,7 +16,7 @@ import numpy as np
 from tisim import Box, Cloud, GrainClass, Material, RandomInDomain, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.common import magnetorheological_fluid as fluid
-from tisim.cases.common.magnetorheological_fluid import MICRO, magnetorheological
+from tisim.cases.common.magnetorheological_fluid import MICRO, SWEPT, magnetorheological
 from tisim.cases.mrf_shear import published
 from tisim.components.accuracy_parameter import three_digits
 from tisim.components.component import Vector
@@ -63,6 +63,9 @@ REST: Vector = (0.0, 0.0, 0.0)
 """The oil at rest, m/s."""
 LOWER, UPPER = 1, 2
 """The groups of the rafts."""
+LARGEST_CHANGE = SWEPT["effects.mutual_induced_moment.largest_change"]
+"""In the mixture of sizes, sweeps in a step continue as in a search. With 1 % there were some hundred in each
+step after chains had formed."""
 STEPS_OF_IMPACT = 40.0
 """Number of steps in the duration of an impact of the smallest grains at IMPACT."""
 IMPACT = 1.0
@@ -102,7 +105,7 @@ SIZES = {
         "some 260 grains of L21's mixture 00:100 in a cell of 66 x 66 x 80 um, at 10 000 1/s",
         {
             "grains": magnetorheological(0.0), "sides": (66 * MICRO, 66 * MICRO, 80 * MICRO),
-            "raft": 10 * MICRO, "rate": RATES[-1],
+            "raft": 10 * MICRO, "rate": RATES[-1], "largest_change": LARGEST_CHANGE,
         },
     ),
     "l21": Size(
@@ -148,6 +151,7 @@ def scene(
     saturation: float | None = None,
     still: bool = False,
     plates: bool = True,
+    largest_change: float = 0.01,
 ) -> Scene:
     """Return the scene of a cell.
 
@@ -160,6 +164,7 @@ def scene(
     rolling : coefficient of rolling friction. cohesion : energy density, J/m^3.
     saturation : magnetisation at which grains saturate, A/m; None for no saturation, as in L21.
     still : whether the oil stays at rest. plates : whether there are smooth plates below and above.
+    largest_change : of a moment, relative to the largest one, above which sweeps in a step continue.
 
     All of these except ``plates``, and whether grains saturate, are values of one structure: cells that
     differ in them run as one batch.
@@ -177,7 +182,7 @@ def scene(
         domain=Box(low=(0.0, 0.0, 0.0), high=sides, periodic=(True, True, False)),
         effects=(
             MagneticField(constant=(0.0, 0.0, flux)),
-            induced(saturation),
+            induced(saturation, largest_change),
             TruncatedDipoleDipole(**CUT),
             fluid.contact_law(cohesion=SJKR()),
             *((Walls(name="plates", planes=ends, material="plate"),) if plates else ()),
@@ -192,14 +197,16 @@ def scene(
     )
 
 
-def induced(saturation: float | None) -> Effect:
+def induced(saturation: float | None, largest_change: float) -> Effect:
     """Return the mutual magnetisation of grains, up to a saturation (A/m) if given.
 
-    The moments are updated by one sweep in each step, as in L21 section 2.2.3.
+    The moments are updated by one sweep in each step, as in L21 section 2.2.3, and by further ones while a
+    moment changes by more than ``largest_change`` of the largest.
     """
+    sweeps: dict[str, Any] = {"sweeps": 0, "largest_change": largest_change, **CUT}
     if saturation is None:
-        return MutualInducedMoment(susceptibility=SUSCEPTIBILITY, sweeps=0, **CUT)
-    return MutualFroehlichMoment(susceptibility=SUSCEPTIBILITY, saturation=saturation, sweeps=0, **CUT)
+        return MutualInducedMoment(susceptibility=SUSCEPTIBILITY, **sweeps)
+    return MutualFroehlichMoment(susceptibility=SUSCEPTIBILITY, saturation=saturation, **sweeps)
 
 
 def sheared(

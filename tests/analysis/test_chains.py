@@ -1,5 +1,7 @@
 """Chains and clusters of known shape."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from tisim.analysis import (
     alignment,
     cluster_shapes,
     contacts,
+    disjoint_chains,
     fabric_tensor,
     fraction_in_clusters,
     head_to_tail,
@@ -103,3 +106,49 @@ def test_long_chains_are_fast(rng):
     assert shapes.path[0] == 1001
     assert shapes.gyration_radii[0] == pytest.approx([np.sqrt(0.5), np.sqrt(0.5), 0], abs=1e-6)
     assert (shapes.size[1:] == 2).all()
+
+
+def ends(number, first, last):
+    """Masks of the particles at which chains begin and end."""
+    return np.isin(np.arange(number), first), np.isin(np.arange(number), last)
+
+
+def test_chains_side_by_side_do_not_share_a_particle():
+    ladder = [(0, 1), (1, 2), (3, 4), (4, 5), (1, 4)]
+    assert disjoint_chains(ladder, *ends(6, [0, 3], [2, 5])) == 2
+    # All three chains of an hourglass lead through its neck.
+    hourglass = [(0, 3), (1, 3), (2, 3), (3, 4), (3, 5), (3, 6)]
+    assert disjoint_chains(hourglass, *ends(7, [0, 1, 2], [4, 5, 6])) == 1
+    assert disjoint_chains(hourglass, *ends(8, [0, 1, 2], [7])) == 0
+    # A particle in both sets is a chain without any bond.
+    assert disjoint_chains(np.empty((0, 2), int), *ends(3, [0, 1], [1, 2])) == 1
+    # Bonds have no direction.
+    assert disjoint_chains([(0, 3), (1, 3), (1, 4), (2, 4)], *ends(5, [0], [2])) == 1
+
+
+def test_as_many_chains_as_particles_separate_their_ends():
+    """Menger's theorem: the smallest separating set, by trial of all subsets."""
+    rng = np.random.default_rng(5)
+    counts = []
+    for _ in range(40):
+        every = np.array(list(combinations(range(7), 2)))
+        pairs = every[rng.random(len(every)) < 0.35]
+        names = rng.permutation(7)
+        first, last = ends(7, names[:3], names[4:])
+        separating = (
+            set(removed)
+            for size in range(8)
+            for removed in combinations(range(7), size)
+            if apart(pairs, set(removed), first, last)
+        )
+        counts.append(len(next(separating)))
+        assert disjoint_chains(pairs, first, last) == counts[-1]
+    assert len(set(counts)) > 2
+
+
+def apart(pairs, removed, first, last):
+    """Whether no chain leads from first to last without the removed particles."""
+    kept = [pair for pair in pairs if not removed & set(pair.tolist())]
+    cluster = labels(len(first), np.reshape(kept, (-1, 2)).astype(int))
+    left = np.isin(np.arange(len(first)), list(removed), invert=True)
+    return not set(cluster[first & left].tolist()) & set(cluster[last & left].tolist())

@@ -168,6 +168,34 @@ def mie(draw):
 
 
 @family
+def morse(draw):
+    """Two particles with a Morse potential collide, head-on or off centre, and part again."""
+    radius, mass = decades(draw, 1e-9, 1e-2), decades(draw, 1e-20, 1e-3)
+    sigma, well = 2 * radius, decades(draw, 0.1, 30.0)
+    speed, alpha = decades(draw, 1e-3, 1e2), decades(draw, 5, 50) / sigma
+    depth = 0.25 * mass * speed**2 * well
+    half = sigma * draw.uniform(0.8, 1.5)
+    r = np.array([[-half, 0, 0], [half, draw.uniform(0, 0.9) * sigma, 0]])
+    v = np.array([[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]])
+    duration = 4 * half / speed
+    # Repulsion alone: a cut-off at the bottom of the well.
+    law = laws.Morse(depth=depth, alpha=alpha, cutoff=1.0)
+    scene = tisim.Scene(particles=given(r, v, radius, mass), effects=(law,), duration=duration)
+
+    def acceleration(t, x, u):
+        d = x[1] - x[0]
+        q = np.linalg.norm(d)
+        e = np.exp(alpha * (sigma - q))
+        push = 2 * alpha * depth * e * (e - 1) if q < sigma else 0.0
+        a = push / mass * d / q
+        return np.array([-a, a])
+
+    return scene, by_path(
+        acceleration, {"position": r, "velocity": v}, duration, max_step=0.01 * sigma / speed
+    )
+
+
+@family
 def elastic_grains(draw):
     """Two elastic Hertzian grains collide off centre without friction; the energy is conserved."""
     radius, rho, mass, young = grains_of(draw)

@@ -9,6 +9,7 @@ from .bounding_ellipsoid import bounding_ellipsoid as bounding_ellipsoid
 from .chains import ClusterShapes as ClusterShapes
 from .chains import alignment as alignment
 from .chains import cluster_shapes as cluster_shapes
+from .chains import disjoint_chains as disjoint_chains
 from .chains import fabric_tensor as fabric_tensor
 from .chains import orientation_tensor as orientation_tensor
 from .clumps import ClumpBodies as ClumpBodies
@@ -33,6 +34,7 @@ from .gravitation import angular_momentum as angular_momentum
 from .gravitation import gravitational_energy as gravitational_energy
 from .gravitation import virial_ratio as virial_ratio
 from .heap import angle_of_repose as angle_of_repose
+from .local_thickness import local_thickness as local_thickness
 from .magnetisation_curves import LognormalFit as LognormalFit
 from .magnetisation_curves import LognormalRadii as LognormalRadii
 from .magnetisation_curves import RadiusClasses as RadiusClasses

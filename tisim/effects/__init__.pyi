@@ -211,6 +211,7 @@ from .magnetic.mutual_moment import (
 )
 from .magnetic.permanent_moment import PermanentMoment as PermanentMoment
 from .pair.mie import Mie as Mie
+from .pair.morse import Morse as Morse
 from .pair.near_field import NearField as NearField
 from .pair.near_field import TruncatedNearField as TruncatedNearField
 from .pair.virial import Virial as Virial

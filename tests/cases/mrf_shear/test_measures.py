@@ -10,7 +10,7 @@ from tisim.analysis import Mean
 from tisim.cases.common.runs import overlap
 from tisim.cases.mrf_shear import checks, published
 from tisim.cases.mrf_shear.checks import approach_time, mason_number, regime, stokes_time
-from tisim.cases.mrf_shear.flow_curve import Curve, paired, table
+from tisim.cases.mrf_shear.flow_curve import Curve, paired, table, yield_table
 from tisim.cases.mrf_shear.measures import (
     area,
     magnetisation,
@@ -124,6 +124,11 @@ def test_yield_stresses_of_each_start():
     of_starts = 40e3 * np.array([0.9, 1.0, 1.1])
     curve = Curve(rates, [group(rate, of_starts + rate) for rate in rates])
     np.testing.assert_allclose(curve.yield_stresses(), of_starts)
+    heading, row = yield_table(curve).splitlines()
+    assert heading == "yield_stress_Pa,half_interval_Pa,of_each_start_Pa"
+    mean, half, each = row.split(",")
+    assert (float(mean), each) == (40000.0, "36000 40000 44000")
+    assert float(half) == pytest.approx(Mean.of(of_starts).half, rel=1e-2)
 
 
 def test_a_curve_is_fitted_with_the_spread_over_starts():

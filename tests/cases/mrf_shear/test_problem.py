@@ -60,7 +60,7 @@ def test_objectives_of_each_variant():
 
 @pytest.mark.slow
 def test_a_fluid_that_a_search_found_has_the_same_stress_from_other_starts():
-    """The design of largest stress in docs/mrf_shear.md; half its field gives a quarter of it, as B^2."""
+    """A design of a front, in docs/mrf_shear.md; half its field gives a quarter of its stress, as B^2."""
     found = {"small": 0.0875, "fraction": 0.2736, "flux": 0.7874}
     fields = (found["flux"], found["flux"] / 2)
     scenes = [problem().scene({**found, "flux": b}, OTHER_STARTS + k) for b in fields for k in range(3)]
