@@ -38,6 +38,7 @@ def test_families_export_all_their_parts(family):
     # Base classes shared by laws of one family, which users do not name.
     shared = {
         "AtIntervals",
+        "Attempts",
         "BehindPlanes",
         "DipolePairs",
         "Dipoles",

@@ -111,6 +111,7 @@ def test_only_rows_of_lists_have_no_table_of_their_own():
         "contact_parts",
         "grain_classes",
         "materials",
+        "particle_shapes",
         "shapes",
     }
 

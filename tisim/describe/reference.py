@@ -31,6 +31,7 @@ from tisim.packing.sizes import SizeDistribution
 from tisim.scene import plugins
 from tisim.scene.initial_state import Start
 from tisim.scene.initial_velocity import Pulse
+from tisim.shapes.particle_shape import ParticleShape
 from tisim.sources.base import Source
 from tisim.sources.magnetic.magnets import Body
 from tisim.state.fields import names_of, resolve_fields
@@ -65,6 +66,7 @@ FAMILIES = {
     "sources": Family("Sources", Source, "effects.NAME"),
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
+    "particle_shapes": Family("Shapes of particles", ParticleShape, ""),
     "motions": Family("Motions of walls and groups", Motion, "effects.walls.motion"),
     "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
     "materials": Family("Materials", ContactProperties, ""),

@@ -14,6 +14,9 @@ from .base import (
     Force as Force,
 )
 from .base import (
+    HardBodies as HardBodies,
+)
+from .base import (
     LongRange as LongRange,
 )
 from .base import (
@@ -108,6 +111,7 @@ from .contact.granular.twisting import (
 )
 from .contact.granular.viscoelastic import ViscoelasticDamping as ViscoelasticDamping
 from .contact.granular.viscous import ViscousFriction as ViscousFriction
+from .contact.hard_rods import HardRods as HardRods
 from .contact.hertz import Hertz as Hertz
 from .contact.normal import NormalContact as NormalContact
 from .contact.parallel_bond import ParallelBond as ParallelBond

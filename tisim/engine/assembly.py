@@ -14,6 +14,7 @@ from tisim.effects.base import (
     DerivedQuantity,
     Effect,
     Force,
+    HardBodies,
     LongRange,
     PairEvent,
     PairForce,
@@ -92,7 +93,8 @@ def measured(effects: Sequence[Effect]) -> dict[str, str]:
 
 def picks_pairs(effects: Sequence[Effect], stepper: Stepper) -> bool:
     """Return whether every pair sum of the scene runs over listed pairs."""
-    pairwise = [effect for effect in effects if isinstance(effect, PairForce | SelfConsistentQuantity)]
+    kinds = PairForce | SelfConsistentQuantity | HardBodies
+    pairwise = [effect for effect in effects if isinstance(effect, kinds)]
     return bool(pairwise) and not stepper.all_pairs and all(effect.short_ranged for effect in pairwise)
 
 
@@ -116,7 +118,8 @@ class Assembly:
     ) -> None:
         self.s, self.domain, self.effects, self.sizes = s, domain, effects, sizes
         events, operators = effects.of(PairEvent), effects.of(Operator)
-        short_ranged = tuple(e for e in effects.of(PairForce, SelfConsistentQuantity) if e.data.short_ranged)
+        kinds = PairForce, SelfConsistentQuantity, HardBodies
+        short_ranged = tuple(e for e in effects.of(*kinds) if e.data.short_ranged)
         surveyed = bool(events) or control.data.watches_pairs
         near = NearList(s, domain, sizes.near) if surveyed else None
         self.pairs = self._listed(short_ranged, sizes) if short_ranged else None

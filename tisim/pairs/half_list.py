@@ -15,7 +15,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.domains.domain import Domain
-from tisim.effects.base import Constraint, Pairwise
+from tisim.effects.base import Constraint, HardBodies, Pairwise
 from tisim.numerics.ieee import far_away
 from tisim.pairs.cell_grid import LEVELS, OfGrid, OfParticles
 from tisim.pairs.cell_phases import cell_phases, measure_phases
@@ -76,6 +76,7 @@ class HalfList(NeighbourRows):
         self.constraints = constraints
         self.within_bodies = any(law.data.within_bodies for law in laws)
         self.solid = any(law.data.solid for law in laws)
+        self.bodies = tuple(law for law in laws if isinstance(law.data, HardBodies))
         self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
@@ -162,8 +163,10 @@ class HalfList(NeighbourRows):
         return a < b or (a == b and self.s.id[w, i] < self.s.id[w, j])
 
     @ti.func
-    def leaves_out(self, w, i, j):
+    def leaves_out(self, w, i, j, d, skin):
         left_out = False
+        for law in ti.static(self.bodies):
+            left_out = left_out or law.apart(self.s, w, i, j, d, skin[0])
         if ti.static(not self.within_bodies):
             left_out = self.joined(w, i, j)
         return left_out

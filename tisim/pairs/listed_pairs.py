@@ -172,13 +172,13 @@ class AddPairs(ComputePairs):
         here, there = self.total.pair_contributions(values)
         self.total.write_memory(self.laws, w, m, values)
         if m < p.outer[w, c]:
-            self.total.write_sum(w, i, self.total.read_sum(w, i) + here)
-            self.total.write_sum(w, j, self.total.read_sum(w, j) + there)
+            self.total.write_sum(w, i, self.total.combine(self.total.read_sum(w, i), here))
+            self.total.write_sum(w, j, self.total.combine(self.total.read_sum(w, j), there))
         elif p.chunk_of(i) == c:
-            self.total.write_sum(w, i, self.total.read_sum(w, i) + here)
+            self.total.write_sum(w, i, self.total.combine(self.total.read_sum(w, i), here))
             self.export(w, m, there)
         else:
-            self.total.write_sum(w, j, self.total.read_sum(w, j) + there)
+            self.total.write_sum(w, j, self.total.combine(self.total.read_sum(w, j), there))
             self.export(w, m, here)
 
     @ti.func
@@ -187,7 +187,7 @@ class AddPairs(ComputePairs):
         if ti.static(self.first):
             self.exported.write(w, m, term)
         else:
-            self.exported.write(w, m, self.exported.read(w, m) + term)
+            self.exported.write(w, m, self.total.combine(self.exported.read(w, m), term))
 
     @ti.func
     def process_distant_pair(self, w, c, m):
@@ -218,7 +218,7 @@ class CloseSum(PartOfSum):
         for i in range(c * p.chunk, ti.min((c + 1) * p.chunk, self.s.count[w])):
             result, begin = self.total.read_sum(w, i), p.fetch_begin[w, i]
             for m in range(begin, begin + p.fetch_count[w, i]):
-                result += self.exported.read(w, p.fetched[w, m])
+                result = self.total.combine(result, self.exported.read(w, p.fetched[w, m]))
             if ti.static(self.listed_only):
                 result += self.total.start(w, i, t)
             self.total.finish(w, i, result, t)

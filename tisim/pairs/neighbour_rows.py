@@ -99,8 +99,9 @@ class NeighbourRows:
         return 0
 
     @ti.func
-    def leaves_out(self, w, i, j):
-        """Return whether the pair is excluded from the list at any distance."""
+    def leaves_out(self, w, i, j, d, skin):
+        """Return whether the pair at separation d (m) is excluded from the list although bounding spheres
+        are near, given the skin along each axis (m)."""
         return False
 
     @ti.func
@@ -229,7 +230,7 @@ class SearchRows(OfBlocks):
                                 seen = n.sees(d, smaller + ti.max(sight, n.sorted_near[w, q]), skin)
                                 if ti.static(n.images > 0):
                                     seen = seen and g.domain.turn(w, place, there) == turn
-                                if seen and not n.leaves_out(w, i, g.order[w, q]):
+                                if seen and not n.leaves_out(w, i, g.order[w, q], d, skin):
                                     self.enter(w, i, g.order[w, q])
                             x += end - begin + 1
 

@@ -137,6 +137,11 @@ class PairSum(AtStage, PerParticle):
         return nothing, nothing
 
     @ti.func
+    def combine(self, a, b):
+        """Return two partial sums of listed pairs as one; a maximum is also possible, whose start is 0."""
+        return a + b
+
+    @ti.func
     def updates_memory(self, w):
         """Return whether the current sum updates the contact history."""
         return False

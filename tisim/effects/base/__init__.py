@@ -42,6 +42,7 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    depends on the values of all other particles. A ``LongRange`` effect sums over all particles by other means
    than pairs, such as a tree of cells or waves. Its phases run before forces are summed, or in each sweep of
    a ``SelfConsistentQuantity``; its ``force`` or ``response`` reads the result from ``self.sum``.
+   ``HardBodies`` have shapes and exert no forces; packing steppers remove their overlaps.
 8. An ``Operator`` changes the state between steps, and an ``AddsParticles`` also adds particles (see
    tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It receives each pair in ``contact`` with exclusive access
@@ -80,6 +81,7 @@ from tisim.effects.base.constraint import Constraint
 from tisim.effects.base.derived_quantity import DerivedQuantity, SelfConsistentQuantity
 from tisim.effects.base.effect import Effect, SceneParts
 from tisim.effects.base.force import Force
+from tisim.effects.base.hard_bodies import HardBodies
 from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
 from tisim.effects.base.pair_force import PairForce, keeps_apart, kinks
@@ -92,6 +94,7 @@ __all__ = [
     "Effect",
     "Field",
     "Force",
+    "HardBodies",
     "LongRange",
     "LongRangeSum",
     "PairEvent",

@@ -1,0 +1,202 @@
+"""Mechanical contraction: single attempts against a NumPy reference, and packings without overlaps."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+from scipy.spatial.transform import Rotation
+
+from tests.compare import same_arrays
+from tisim import Box, InputError, Particles, Scene, Simulation, run
+from tisim.effects import Gravity
+from tisim.effects.contact.hard_rods import HardRods
+from tisim.engine.checkpoint import restore, save
+from tisim.shapes import SpherocylinderShape
+from tisim.steppers.packing.mechanical_contraction import MechanicalContraction
+
+ROD, SPHERE = SpherocylinderShape(length=1.5, diameter=1.0), SpherocylinderShape(length=0.0, diameter=1.0)
+METHODS = ("revised", "original")
+
+
+def scene(shape, number, fraction=0.05, seed=0, duration=1000.0, **settings):
+    """Bodies at random places of a cubic box; they may overlap."""
+    side = (number * shape.volume() / fraction) ** (1 / 3)
+    particles = Particles(
+        position=np.random.default_rng(seed).uniform(0, side, (number, 3)),
+        velocity=np.zeros((number, 3)),
+        mass=np.ones(number),
+        radius=np.full(number, shape.bounding_radius()),
+    )
+    return Scene(
+        particles=particles,
+        effects=[HardRods(rods=(shape,))],
+        domain=Box(low=(0, 0, 0), high=(side, side, side)),
+        duration=duration,
+        stepper=MechanicalContraction(**settings),
+        seed=seed,
+    )
+
+
+def contact(separation, axis_i, axis_j, half, radius):
+    """Overlap, normal from i to j, and points of contact of two rods, by least squares within bounds."""
+    # Both ends lie on segments: least squares within bounds, by an active set, which is exact.
+    axes = np.stack([axis_i, -axis_j], axis=1)
+    best = lsq_linear(axes, separation, (-half - 1e-300, half + 1e-300), method="bvls", tol=1e-15)
+    a, b = best.x
+    apart = separation + b * axis_j - a * axis_i
+    distance = np.linalg.norm(apart)
+    normal = apart / distance
+    return 2 * radius - distance, normal, a * axis_i + radius * normal, b * axis_j - radius * normal
+
+
+def attempt(state, side, shape, method, dt=0.1, beta=0.5, tolerance=1e-4):
+    """Positions and orientations after one attempt to remove the overlaps; B16 (2.7)-(2.10), (3.6)-(3.13)."""
+    x, turns = state["position"], Rotation.from_quat(state["orientation"], scalar_first=True)
+    axes, number, mass = turns.apply([0.0, 0.0, 1.0]), len(x), shape.volume()
+    touching = [[] for _ in range(number)]
+    for i in range(number):
+        for j in range(i):
+            d = x[j] - x[i]
+            d -= side * np.round(d / side)
+            depth, normal, here, there = contact(d, axes[i], axes[j], shape.length / 2, shape.diameter / 2)
+            if depth > tolerance:
+                touching[i].append((depth, -normal, here))
+                touching[j].append((depth, normal, there))
+    places, orientations = x.copy(), turns.as_matrix()
+    for i, contacts in enumerate(touching):
+        if not contacts:
+            continue
+        weights = [depth * (1 - depth) if method == "original" else 1.0 for depth, _, _ in contacts]
+        push = sum(weight * n for weight, (_, n, _) in zip(weights, contacts, strict=True))
+        twist = sum(weight * np.cross(r, n) for weight, (_, n, r) in zip(weights, contacts, strict=True))
+        body = orientations[i]
+        tensor = body @ np.diag(mass * shape.moments()) @ body.T
+        if method == "revised":
+            spin = np.linalg.solve(tensor, twist)
+            multiplier = np.sqrt(0.5 * (push @ push / mass + twist @ spin))
+            step = dt * min(depth for depth, _, _ in contacts) / multiplier
+            shift, turn = step * push / mass, step * spin
+        else:
+            spin = twist / shape.moments()[0]
+            rates = [((push + np.cross(spin, r)) @ n) / depth for depth, n, r in contacts]
+            step = beta / max(rates)
+            shift, turn = step * push, step * spin
+        places[i] = (x[i] + shift) % side
+        orientations[i] = Rotation.from_rotvec(turn).as_matrix() @ body
+    return places, orientations
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_attempt_equals_its_reference(method):
+    """Until the first contraction, from deep overlaps on."""
+    made = scene(ROD, 100, 0.08, method=method)
+    side, simulation = made.domain.high[0], Simulation(made, 1)
+    simulation.load([made])
+    moved = 0.0
+    for _ in range(4):
+        before = {name: np.array(simulation.state[name]) for name in ("position", "orientation")}
+        places, orientations = attempt(before, side, ROD, method)
+        simulation.run(steps=1)
+        after = {name: np.array(simulation.state[name]) for name in before}
+        np.testing.assert_allclose(after["position"], places, rtol=0, atol=1e-10)
+        found = Rotation.from_quat(after["orientation"], scalar_first=True).as_matrix()
+        # The axis alone: a rotation about it moves nothing.
+        np.testing.assert_allclose(found[:, :, 2], orientations[:, :, 2], rtol=0, atol=1e-10)
+        moved = max(moved, np.abs(after["position"] - before["position"]).max())
+    assert moved > 0.01
+    simulation.close()
+
+
+def deepest(state, side, shape, size):
+    """The deepest overlap, in D."""
+    x, scaled = state["position"], size / shape.bounding_radius()
+    axes = Rotation.from_quat(state["orientation"], scalar_first=True).apply([0.0, 0.0, 1.0])
+    depths = []
+    for i in range(len(x)):
+        d = x[:i] - x[i]
+        d -= side * np.round(d / side)
+        for j in np.flatnonzero(np.linalg.norm(d, axis=1) < 2 * size):
+            half, radius = scaled * shape.length / 2, scaled * shape.diameter / 2
+            depths.append(contact(d[j], axes[i], axes[j], half, radius)[0] / (2 * radius))
+    return max(depths)
+
+
+def fraction(result, shape):
+    size = result.state["radius"][0] / shape.bounding_radius()
+    return len(result.state["radius"]) * shape.volume() * size**3 / result.scene.domain.high[0] ** 3
+
+
+@pytest.mark.parametrize(("shape", "method"), [(SPHERE, "revised"), (SPHERE, "original"), (ROD, "original")])
+def test_a_packing_has_no_overlaps_and_cannot_be_contracted(shape, method):
+    # Longer motions than B16's 0.1 need fewer attempts, and pack a little less densely.
+    made = scene(shape, 100, 0.2, duration=1e6, method=method, attempts=400, volume_step=0.4, motion=0.5)
+    result = run(made)
+    assert result.status.ok
+    assert result.time < 1e6
+    assert 0.45 < fraction(result, shape) < 0.72
+    depth = deepest(result.state, made.domain.high[0], shape, result.state["radius"][0])
+    assert -0.01 < depth <= 1e-4 * (1 + 1e-9)
+
+
+def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_overlaps():
+    for duration in (60.0, 95.0, 130.0):
+        made = scene(ROD, 100, 0.05, duration=duration, method="original")
+        result = run(made)
+        size = result.state["radius"][0]
+        assert deepest(result.state, made.domain.high[0], ROD, size) <= 1e-4 * (1 + 1e-9)
+        assert result.work["contractions"] > 0
+
+
+def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
+    scenes = [scene(ROD, 100 + k, 0.1, seed=k, duration=60.0, method="original") for k in range(3)]
+    usual = run(scenes)
+    (alone,) = run([scenes[1]])
+    simulation = Simulation(scenes[0], 3, capacity=102)
+    simulation.load(scenes)
+    simulation.run(steps=17)
+    save(simulation, tmp_path / "c.h5")
+    simulation.run(steps=3)
+    simulation.load(scenes)
+    restore(simulation, tmp_path / "c.h5")
+    simulation.run()
+    for other in (alone, simulation.results()[1]):
+        assert (other.time, other.work) == (usual[1].time, usual[1].work)
+        same_arrays(other.state, usual[1].state)
+    simulation.close()
+
+
+def test_other_effects_and_domains_are_refused():
+    made = scene(ROD, 100)
+    parts = {name: getattr(made, name) for name in ("particles", "effects", "domain", "duration", "stepper")}
+    flat = Box(low=(0, 0, 0), high=made.domain.high, periodic=(True, True, False))
+    for change, message in (
+        ({"effects": [*made.effects, Gravity()]}, "effects.gravity must be hard bodies alone"),
+        ({"domain": flat}, "domain must be a periodic box for mechanical_contraction; received 'box'"),
+        ({"effects": [Gravity()]}, "effects must be one with hard bodies for mechanical_contraction"),
+    ):
+        with pytest.raises(InputError, match=message):
+            Scene(**{**parts, **change})
+
+
+def test_a_box_must_be_wide_enough_at_the_highest_density():
+    with pytest.raises(InputError, match=r"box must be at least 5 m wide at a packing fraction of 0.75"):
+        run(scene(ROD, 40))
+
+
+def test_quaternions_and_shapes_of_a_start_are_checked():
+    made = scene(ROD, 100)
+    for name, value, message in (
+        ("orientation", np.full((100, 4), 1.0), "particles.orientation must be unit quaternions"),
+        ("shape", np.full(100, 1), "particles.shape must be below 1, the shapes"),
+    ):
+        start = made.start() | {name: value}
+        with pytest.raises(InputError, match=message):
+            made.effects[0].check_start(start, made)
+
+
+def test_orientations_of_a_start_are_random_unless_given():
+    made = scene(ROD, 400)
+    axes = Rotation.from_quat(made.start()["orientation"], scalar_first=True).apply([0.0, 0.0, 1.0])
+    # Each component has the variance 1/3, known to 5 standard errors.
+    assert np.abs((axes**2).mean(axis=0) - 1 / 3).max() < 5 * np.sqrt(4 / 45 / 400)
+    other = scene(ROD, 400, seed=1).start()["orientation"]
+    assert np.abs(other - made.start()["orientation"]).max() > 0.1

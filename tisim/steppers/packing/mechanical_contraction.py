@@ -1,0 +1,276 @@
+"""The mechanical contraction method: random packings of hard bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
+
+from tisim.backend.taichi import ti
+from tisim.components.component import option, parameter
+from tisim.effects.base import Effect, HardBodies, SceneParts
+from tisim.errors import must
+from tisim.numerics import elementary
+from tisim.numerics.vectors import product
+from tisim.pairs.listed_pairs import sum_phases
+from tisim.program.phases import PerParticle, Phase
+from tisim.state.fields import Field, WorldField
+from tisim.steppers.base import Stepper
+from tisim.steppers.common import BeginStep, apply_displacement
+from tisim.steppers.context import Buffer, Step, StepContext
+from tisim.steppers.packing.overlaps import (
+    INVERSE_OVERLAP,
+    OVERLAP_PUSH,
+    OVERLAP_TWIST,
+    REMOVAL_RATE,
+    RemovalRates,
+    SumOverlaps,
+)
+from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
+from tisim.steppers.verlet import Advance
+
+ACCEPTED_FIELDS = (
+    Field("accepted_position", "m", 3, "keep", default="position", scratch=True),
+    Field("accepted_orientation", "", 1, "keep", slots=4, scratch=True),
+    Field("accepted_radius", "m", 1, "keep", default="radius", scratch=True),
+)
+"""The last configuration without overlaps."""
+MOVE, CONTRACT, RETURN = 0, 1, 2
+"""What a step does: remove overlaps, contract a configuration without overlaps, or return to the last one."""
+
+
+class Attempts(FixedStep):
+    """A step is one attempt to remove the overlaps of a packing, and takes a time without physical
+    meaning."""
+
+    dt: float = parameter("s", "time of an attempt", 1.0, ge=SHORTEST_STEP)
+
+
+class MechanicalContraction(Stepper):
+    """Mechanical contraction packs hard bodies: it contracts the system until overlaps remain.
+
+    After each small contraction it tries to remove the overlaps by moving and turning bodies:
+
+        v_i = (lambda m_i)^-1 sum_j n_ij,    omega_i = (lambda I_i)^-1 sum_j r_ij x n_ij,
+        r_i += dt delta_i v_i                                                     (3.6)-(3.12), revised
+        v_i = sum_j delta_ij k_ij,    omega_i = xi^-1 sum_j delta_ij r_ij x k_ij,
+        r_i += v_i beta min_j delta_ij / ((v_i + omega_i x r_ij) . n_ij)          (2.7)-(2.10), original
+
+    n is the normal along which body i leaves body j, k the vector between the axes, delta the overlap,
+    delta_i the smallest overlap of i, and lambda makes the kinetic energy of each body equal to 1. Lengths
+    are in units of D, the shortest side of the box around the first shape, and densities are 1.
+
+    One step is one attempt to remove all overlaps; it takes the time ``dt`` of the control, so the duration
+    of a run is the largest number of attempts. The box keeps its size and the bodies grow, which is the same
+    as a contracting box up to the scale of all lengths. If overlaps remain after ``attempts``, the world
+    returns to its last configuration without overlaps, and contracts by half the step. It ends in that
+    configuration after ``halvings``.
+
+    The original method refers to rods. Overlaps of the start are removed first.
+
+    Source: B16 chapters 2 and 3; S. R. Williams, A. P. Philipse, Phys. Rev. E 67 (2003) 051301.
+    """
+
+    control: Attempts = option("time of an attempt", Attempts())
+    method: Literal["revised", "original"] = option("the way in which bodies are moved", "revised")
+    volume_step: float = parameter("D^3", "first step by which the volume decreases", 0.1, gt=0)
+    halvings: int = option("how often the step of the volume is halved before a world ends", 4, ge=0)
+    attempts: int = option("attempts to remove the overlaps of a contraction", 100_000, ge=1)
+    tolerance: float = parameter("D", "overlap that is permitted", 1e-4, ge=0)
+    motion: float = parameter("", "step dt of the revised method", 0.1, gt=0)
+    fraction: float = parameter("", "fraction beta of the original method", 0.5, gt=0)
+    inertia: float = parameter(
+        "D^2", "xi over the moment of inertia of a body of mass 1, of the original method", 1.0, gt=0
+    )
+
+    world_fields: ClassVar = (
+        WorldField("overlapping", "sum"),
+        WorldField("contractions", "counter"),
+        WorldField("attempted", "integer"),
+        WorldField("halved", "integer"),
+        WorldField("packing_action", "integer"),
+        WorldField("box_volume", "real"),
+        WorldField("volume_decrease", "real"),
+        WorldField("growth", "real"),
+    )
+
+    def check(self, scene: SceneParts) -> None:
+        super().check(scene)
+        bodies = [effect for effect in scene.effects if isinstance(effect, HardBodies)]
+        must(len(bodies) == 1, "effects", f"one with hard bodies for {self.kind()}, such as hard_rods",
+             [effect.label for effect in scene.effects])  # fmt: skip
+        for effect in scene.effects:
+            rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
+            must(effect is bodies[0], f"effects.{effect.label}", rule, effect.kind())
+        low, _high = scene.domain.bounds()
+        whole = low is not None and all(scene.domain.imaged())
+        must(whole, "domain", f"a periodic box for {self.kind()}", scene.domain.kind())
+
+    def independent(self, effects: Sequence[Effect]) -> bool:
+        return False
+
+    def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
+        return (
+            OVERLAP_PUSH,
+            OVERLAP_TWIST,
+            INVERSE_OVERLAP,
+            *((REMOVAL_RATE,) if self.method == "original" else ()),
+            *ACCEPTED_FIELDS,
+        )
+
+    @ti.func
+    def weight(self, depth):
+        """Return the weight of an overlap (D) in the sums of a body."""
+        weight = 0.0 * depth + 1.0
+        if ti.static(self.method == "original"):
+            weight = depth * (1.0 - depth)
+        return weight
+
+    def step(self, context: StepContext) -> Step:
+        (bodies,) = context.effects.of(HardBodies)
+        overlaps = SumOverlaps(context, bodies)
+        shared = overlaps.exported()
+        # Lists may have been lengthened since the last step, and are then empty.
+        items = [*context.update_lists, BeginAttempt(context), *sum_phases(overlaps, shared)]
+        items.append(ChooseAction(context, bodies))
+        buffers = [Buffer(shared, "overlaps between chunks", self.kind())]
+        if self.method == "original":
+            rates = RemovalRates(context, bodies)
+            memory = rates.exported()
+            items += [ScaleTwist(context, bodies), *sum_phases(rates, memory)]
+            buffers.append(Buffer(memory, "removal rates between chunks", self.kind()))
+        motion = (BeginStep(context), MoveBodies(context, bodies), Advance(context))
+        return Step((*items, *motion), tuple(buffers))
+
+
+class BeginAttempt(Phase):
+    """This phase resets the number of bodies with overlaps."""
+
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.overlapping[w] = 0
+
+
+class ChooseAction(Phase):
+    """This phase chooses whether to remove overlaps, to contract the world, or to return to the last
+    configuration without overlaps."""
+
+    def __init__(self, context: StepContext, bodies: Any) -> None:
+        self.s, self.stepper, self.bodies = context.s, context.stepper, bodies
+        self.domain, self.control = context.domain, context.control
+
+    @ti.func
+    def run(self, w, _k):
+        s = self.s
+        if s.steps[w] == 0:
+            size, side = self.bodies.size(s, w, 0) * self.bodies.unit(w, 0), self.domain.side(w)
+            s.box_volume[w] = ti.cast(side[0] / size * (side[1] / size) * (side[2] / size), ti.f64)
+            s.volume_decrease[w] = ti.cast(self.stepper.volume_step(w), ti.f64)
+        last = s.end[w] - s.time[w] <= ti.cast(1.5, ti.f64) * ti.cast(self.control.dt(w), ti.f64)
+        volume, ends = s.box_volume[w], False
+        s.packing_action[w] = MOVE
+        if s.overlapping[w] == 0:
+            s.packing_action[w] = CONTRACT
+            s.contractions[w] += 1
+            s.attempted[w] = 0
+        elif (s.attempted[w] >= self.stepper.attempts and s.contractions[w] > 0) or last:
+            s.packing_action[w] = RETURN
+            # The last contraction is taken back.
+            volume += s.volume_decrease[w]
+            s.attempted[w] = 0
+            s.halved[w] += 1
+            s.volume_decrease[w] = 0.5 * s.volume_decrease[w]
+            ends = s.halved[w] > self.stepper.halvings or last
+        else:
+            s.attempted[w] += 1
+        s.growth[w] = 1.0
+        if s.packing_action[w] != MOVE:
+            s.box_volume[w] = volume
+            if not ends and not (last and s.packing_action[w] == CONTRACT):
+                s.box_volume[w] = volume - s.volume_decrease[w]
+                s.growth[w] = elementary.pow(volume / s.box_volume[w], 1.0 / 3.0)
+        if ends:
+            s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
+
+
+class ScaleTwist(PerParticle):
+    """This phase turns the moments of a body into its angular velocity, in the original method."""
+
+    def __init__(self, context: StepContext, bodies: Any) -> None:
+        super().__init__(context.s)
+        self.stepper, self.bodies = context.stepper, bodies
+
+    @ti.func
+    def run(self, w, i):
+        s, unit = self.s, self.bodies.unit(w, 0)
+        moment = self.bodies.moment_x(w, s.shape[w, i]) / (unit * unit)
+        s.overlap_twist[w, i] = s.overlap_twist[w, i] / (self.stepper.inertia(w) * moment)
+
+
+class MoveBodies(PerParticle):
+    """This phase moves and turns each body, or puts it back to the last configuration without overlaps, and
+    lets it grow."""
+
+    def __init__(self, context: StepContext, bodies: Any) -> None:
+        super().__init__(context.s)
+        self.stepper, self.bodies, self.domain = context.stepper, bodies, context.domain
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        before, radius, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
+        place, far = before, ti.cast(0.0, s.real)
+        if s.packing_action[w] == MOVE:
+            shift, turn = self.motion(w, i)
+            place = before + shift
+            self.rotate(w, i, turn)
+            far = turn.norm() * radius
+        elif s.packing_action[w] == CONTRACT:
+            s.accepted_position[w, i], s.accepted_radius[w, i] = before, radius
+            for k in ti.static(range(4)):
+                s.accepted_orientation[w, i, k] = s.orientation[w, i, k]
+        else:
+            place = s.accepted_position[w, i]
+            for k in ti.static(range(4)):
+                s.orientation[w, i, k] = s.accepted_orientation[w, i, k]
+            s.radius[w, i] = s.accepted_radius[w, i]
+            # Lists are rebuilt, whatever has changed since.
+            far = 2.0 * radius
+        s.radius[w, i] = s.radius[w, i] * ti.cast(s.growth[w], s.real)
+        grown = ti.cast(s.radius[w, i] - radius, ti.f64) + ti.cast(far, ti.f64)
+        path = self.domain.nearest(w, before, place, end)
+        apply_displacement(s, self.domain, w, i, place, ti.cast(path, ti.f64), grown, end)
+
+    @ti.func
+    def motion(self, w, i):
+        """Return the displacement (m) and the rotation vector (rad) of a body that removes its overlaps."""
+        s = self.s
+        push, twist = s.overlap_push[w, i], s.overlap_twist[w, i]
+        size = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
+        shift, turn = 0.0 * push, 0.0 * push
+        if s.inverse_overlap[w, i] > 0.0:
+            if ti.static(self.stepper.method == "revised"):
+                mass, spin = self.bodies.mass(s, w, i), self.bodies.spun(s, w, i, twist)
+                energy = 0.5 * (push.norm_sqr() / mass + twist.dot(spin))
+                if energy > 0.0:
+                    part = self.stepper.motion(w) / ti.sqrt(energy) / s.inverse_overlap[w, i]
+                    shift, turn = part / mass * push, part / size * spin
+            else:
+                if s.removal_rate[w, i] > 0.0:
+                    part = self.stepper.fraction(w) / s.removal_rate[w, i]
+                    shift, turn = part * push, part / size * twist
+        return shift, turn
+
+    @ti.func
+    def rotate(self, w, i, turn):
+        """Turn a body by a rotation vector (rad)."""
+        s, angle = self.s, turn.norm()
+        if angle > 0.0:
+            half = 0.5 * angle
+            u = elementary.sin(half) / angle * turn
+            q = product(ti.Vector([elementary.cos(half), u[0], u[1], u[2]]), self.bodies.turn(s, w, i))
+            q = q / q.norm()
+            for k in ti.static(range(4)):
+                s.orientation[w, i, k] = q[k]

@@ -1,0 +1,143 @@
+"""Sums over the overlaps of hard bodies."""
+
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.numerics.vectors import piece
+from tisim.pairs.listed_pairs import ExportedTerms
+from tisim.pairs.pair_sum import ListedLaws, PairSum
+from tisim.state.bound import Bound
+from tisim.state.fields import Field
+from tisim.steppers.context import StepContext
+
+OVERLAP_PUSH = Field("overlap_push", "", 3, "keep", scratch=True)
+"""Sum of the weighted normals of the overlaps of a body, away from the others."""
+OVERLAP_TWIST = Field("overlap_twist", "", 3, "keep", scratch=True)
+"""Sum of the moments of these normals, with arms in units of D."""
+INVERSE_OVERLAP = Field("inverse_overlap", "1/m", 1, "keep", scratch=True)
+"""1 over the smallest overlap of a body; 0 for a body without overlaps."""
+REMOVAL_RATE = Field("removal_rate", "1/s", 1, "keep", scratch=True)
+"""Largest speed at which the motion of a body removes an overlap, over the overlap."""
+
+
+class BodySum(PairSum):
+    """Base of the sums over the overlaps of bodies.
+
+    tolerance : overlaps (in D) up to this one do not count.
+    """
+
+    commits: ClassVar[bool] = False
+
+    def __init__(self, context: StepContext, bodies: Bound[Any]) -> None:
+        assert context.neighbour_lists is not None
+        super().__init__(context.s, context.domain, (bodies,), context.neighbour_lists.pairs)
+        self.bodies, self.stepper = bodies, context.stepper
+
+    def exported(self) -> ExportedTerms:
+        """Return the memory of the terms between chunks."""
+        assert self.pairs is not None
+        return ExportedTerms(self.pairs, self.components)
+
+    @ti.func
+    def overlap(self, w, i, j, separation):
+        """Return the overlap (m) of two bodies, whether it counts, the normal from i to j, and the points of
+        contact, in units of D of each body."""
+        s = self.s
+        gap, normal, here, there = self.bodies.closest(s, w, i, j, separation)
+        size_i = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
+        size_j = self.bodies.size(s, w, j) * self.bodies.unit(w, 0)
+        counts = -gap > self.stepper.tolerance(w) * ti.min(size_i, size_j)
+        return -gap, counts, normal, here / size_i, there / size_j
+
+
+class SumOverlaps(BodySum):
+    """This sum sets push and twist of each body, and the inverse of its smallest overlap."""
+
+    components = 7
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, 10, False)
+
+    @ti.func
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        depth, counts, normal, here, there = self.overlap(w, i, j, separation)
+        size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
+        weight = ti.select(counts, self.stepper.weight(depth / size), 0.0)
+        values = ti.Vector.zero(self.s.real, 10)
+        push, turn_i, turn_j = weight * normal, -weight * here.cross(normal), weight * there.cross(normal)
+        for k in ti.static(range(3)):
+            values[k], values[3 + k], values[6 + k] = push[k], turn_i[k], turn_j[k]
+        values[9] = ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
+        return values
+
+    @ti.func
+    def pair_contributions(self, values):
+        push, here, there = piece(values, 0, 3), piece(values, 3, 3), piece(values, 6, 3)
+        return (
+            ti.Vector([-push[0], -push[1], -push[2], here[0], here[1], here[2], values[9]]),
+            ti.Vector([push[0], push[1], push[2], there[0], there[1], there[2], values[9]]),
+        )
+
+    @ti.func
+    def combine(self, a, b):
+        total = a + b
+        total[6] = ti.max(a[6], b[6])
+        return total
+
+    @ti.func
+    def write_sum(self, w, i, total):
+        s = self.s
+        for k in ti.static(range(3)):
+            s.overlap_push[w, i][k], s.overlap_twist[w, i][k] = total[k], total[3 + k]
+        s.inverse_overlap[w, i] = total[6]
+
+    @ti.func
+    def read_sum(self, w, i):
+        s = self.s
+        push, twist = s.overlap_push[w, i], s.overlap_twist[w, i]
+        return ti.Vector([push[0], push[1], push[2], twist[0], twist[1], twist[2], s.inverse_overlap[w, i]])
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        self.write_sum(w, i, total)
+        if total[6] > 0.0:
+            ti.atomic_add(self.s.overlapping[w], ti.i64(1))
+
+
+class RemovalRates(BodySum):
+    """This sum sets the largest rate at which the motion of a body, push and twist, removes one of its
+    overlaps."""
+
+    components = 1
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, 2, False)
+
+    @ti.func
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        s = self.s
+        depth, counts, normal, here, there = self.overlap(w, i, j, separation)
+        over = ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
+        speed_i = -(s.overlap_push[w, i] + s.overlap_twist[w, i].cross(here)).dot(normal)
+        speed_j = (s.overlap_push[w, j] + s.overlap_twist[w, j].cross(there)).dot(normal)
+        return ti.Vector([ti.max(speed_i, 0.0) * over, ti.max(speed_j, 0.0) * over])
+
+    @ti.func
+    def pair_contributions(self, values):
+        return ti.Vector([values[0]]), ti.Vector([values[1]])
+
+    @ti.func
+    def combine(self, a, b):
+        return ti.max(a, b)
+
+    @ti.func
+    def write_sum(self, w, i, total):
+        self.s.removal_rate[w, i] = total[0]
+
+    @ti.func
+    def read_sum(self, w, i):
+        return ti.Vector([self.s.removal_rate[w, i]])
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        self.write_sum(w, i, total)
