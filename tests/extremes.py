@@ -27,6 +27,7 @@ from tisim.effects import (
     DerivedQuantity,
     Effect,
     Granular,
+    HardRods,
     Impact,
     InducedMoment,
     LangevinMoment,
@@ -174,11 +175,16 @@ EACH = {"group": [1, 0, 0]} | {
 FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 
 
+PACKED = (HardRods,)
+"""Hard bodies, which need a packing stepper and more bodies; see tests/steppers/packing."""
+
+
 @cache
 def scenes() -> dict[str, dict[str, Any]]:
     """Scenes as plain data, by name: one for each effect, source and operator, and those for each stepper."""
     serialization.load(steppers)
-    scenes_by_name = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in known_effects()}
+    kinds = [kind for kind in known_effects() if kind not in PACKED]
+    scenes_by_name = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in kinds}
     for name in sorted(CONTROLLED):
         fluid = FLUID if name in ("brownian", "langevin") else {}
         for k, (control, options, effects) in enumerate(CONTROLLED[name]):

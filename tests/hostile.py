@@ -14,7 +14,7 @@ from tisim import Blast, Cloud, Material, RandomAroundCylinder, RandomInBox, ste
 from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.describe.explain import known_effects
-from tisim.effects import Effect
+from tisim.effects import Effect, HardBodies, HardRods
 from tisim.sources import MagneticField
 from tisim.steppers import DriftLimit, FixedStep, Stepper
 
@@ -130,7 +130,9 @@ def valid() -> tuple[dict[str, Any], ...]:
     for name, kind in _kinds(Stepper).items():
         fluid = {"temperature": 300.0, "viscosity": 1e-3} if name in ("brownian", "langevin") else {}
         control = {"control": controls[name]} if name in controls else {}
-        tables_.append({**base.to_dict(), "stepper": serialization.to_dict(kind(**fluid, **control))})
+        packed = name == "mechanical_contraction"
+        more = {"effects": with_needed(HardRods), "domain": box} if packed else {}
+        tables_.append({**base.to_dict(), **more, "stepper": serialization.to_dict(kind(**fluid, **control))})
     return (
         *tables_,
         *(
@@ -141,6 +143,7 @@ def valid() -> tuple[dict[str, Any], ...]:
                 "effects": with_needed(kind),
             }
             for kind in known_effects()
+            if not issubclass(kind, HardBodies)
         ),
     )
 

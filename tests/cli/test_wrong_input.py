@@ -45,7 +45,7 @@ WRONG = [
     (["optimize", "capture", "--size", "25nm"], "size must be one of default for the inverse problem"),
     (["compare", "blast", "--size", "clumps"], "size must be one of small, default for the inverse problem"),
     (["optimize", "capture", "--size", "huge"], "size must be one of default, longitudinal, long, 25nm; rec"),
-    (["optimize", "cascade"], "case must be one with an inverse problem; received 'cascade'"),
+    (["optimize", "concentration"], "case must be one with an inverse problem; received 'concentration'"),
     (["cache", "none.h5"], "cache file must be an existing file; received 'none.h5'"),
     (["cache", "flow.toml"], "by a cache; received a file that is another program's, or damaged at its"),
     (["frobnicate"], "command must be one of run, cases, explain, "),

@@ -14,6 +14,9 @@ from tisim import steppers
 from tisim.components import serialization
 from tisim.steppers import StepControl, Stepper
 
+PACKED = {"mechanical_contraction", "attempts"}
+"""Parts of packings; tests/steppers/packing has the ends of their ranges."""
+
 
 @pytest.fixture(scope="module")
 def runs():
@@ -59,4 +62,4 @@ def test_every_kind_is_there():
         (StepControl, {stepper["control"]["kind"] for stepper in tables}),
     ):
         own = {name for name, kind in contract.known().items() if kind.__module__.startswith("tisim.")}
-        assert own == names
+        assert own - PACKED == names

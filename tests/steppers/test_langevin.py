@@ -1,4 +1,4 @@
-"""Langevin dynamics: statistics of free and trapped particles, motion without heat, and a twin in NumPy."""
+"""Langevin dynamics: statistics of free and trapped particles, motion without heat, and a NumPy reference."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov, solve_discrete_lyapuno
 
 from tests.scenes import compiled, roundoff
 from tests.steppers.charged import order
-from tests.steppers.langevin_twin import (
+from tests.steppers.langevin_reference import (
     FRICTION,
     HEAT,
     MASS,
@@ -40,7 +40,7 @@ def thermal(seed=3):
 
 
 @pytest.mark.parametrize("a", [1e-6, 0.3, 1.9, 2.1, 30.0])
-def test_steps_are_those_of_the_twin(a):
+def test_steps_are_those_of_the_reference(a):
     """The noise of each step is that of a particle without forces, which starts at rest; both worlds have the
     same seed. 1.9 and 2.1 are on both sides of the two forms of tanh."""
     start, speed = 3e-9 * np.array([1.0, -2.0, 0.5]), SPEED * np.array([0.5, 1.0, -2.0])

@@ -7,7 +7,7 @@ import pytest
 from tests.compare import same_result
 from tests.scenes import compiled, simulate
 from tests.steppers.brownian.colloids import Stop
-from tests.steppers.langevin_twin import MASS, RADIUS, SPEED, TEMPERATURE, TIME, VISCOSITY, particles
+from tests.steppers.langevin_reference import MASS, RADIUS, SPEED, TEMPERATURE, TIME, VISCOSITY, particles
 from tests.throwaway import SoftShell
 from tisim import Box, InputError, Simulation
 from tisim.effects import (

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 from pydantic.fields import FieldInfo
 
-from tisim import packing
+from tisim import packing, shapes
 from tisim.components import serialization
 from tisim.components.component import Checked, Component
 from tisim.components.invalid import text_of, unit_of
@@ -56,6 +56,7 @@ class Family:
         """Return the known parts of the family, by name."""
         plugins.load_parts()
         serialization.load(packing)
+        serialization.load(shapes)
         narrower = tuple(one.base for one in FAMILIES.values() if one.base in self.base.__subclasses__())
         known = sorted(self.base.known().items())
         return {name: kind for name, kind in known if not issubclass(kind, narrower)}

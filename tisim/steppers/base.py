@@ -14,6 +14,7 @@ from tisim.effects.base import (
     DerivedQuantity,
     Effect,
     Force,
+    HardBodies,
     LongRange,
     PairEvent,
     SceneParts,
@@ -43,7 +44,7 @@ class Stepper(Component):
     draws random numbers, so that only statistics converge. all_pairs : whether it sums over all pairs itself.
     follows_shear : whether it places moved particles with ``domain.put``, at the time of the new place, and
     reports displacements relative to ``drift``, so that it can step a sheared box. follows_constraints :
-    whether it leaves particles held by constraints to the constraints.
+    whether it leaves particles held by constraints to the constraints. packs : whether it moves hard bodies.
     """
 
     contract: ClassVar[bool] = True
@@ -52,6 +53,7 @@ class Stepper(Component):
     random: ClassVar[bool] = False
     follows_shear: ClassVar[bool] = False
     follows_constraints: ClassVar[bool] = False
+    packs: ClassVar[bool] = False
     control: StepControl = option("step control, which chooses the length of the next step")
 
     @property
@@ -66,6 +68,9 @@ class Stepper(Component):
             if isinstance(effect, Constraint):
                 rule = f"one that follows constraints, such as verlet, with effects.{effect.label}"
                 must(self.follows_constraints, "stepper", rule, self.kind())
+            elif isinstance(effect, HardBodies):
+                rule = f"one that packs, such as mechanical_contraction, with effects.{effect.label}"
+                must(self.packs, "stepper", rule, self.kind())
         if domain.shears():
             where = f"in a {domain.kind()}"
             rule = f"one that follows shear, such as verlet or boris, {where}"

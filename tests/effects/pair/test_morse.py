@@ -18,7 +18,7 @@ def potential(law, d, touch):
     return law.depth * (e**2 - 2 * e)
 
 
-def twin(law, state):
+def reference(law, state):
     """The derivative of the potential, by a central difference of fourth order, within the cut-off."""
     n, d = pairs(state)
     touch, h = state["radius"][:, None] + state["radius"], 1e-4 * d
@@ -33,7 +33,7 @@ def test_forces_are_the_gradient_of_the_potential(rng):
     values = ((1.0, 20.0, 1.0), (2.0, 60.0, 1.3), (0.5, 5.0, 2.5))
     scenes = [crowd(rng, Morse(depth=depth, alpha=alpha, cutoff=cut)) for depth, alpha, cut in values]
     for one, state in zip(scenes, loads(scenes), strict=True):
-        expected = twin(one.effects[0], state)
+        expected = reference(one.effects[0], state)
         assert np.abs(expected).max() > 0
         close(state["force"], expected, 1e-8)
         balanced(state)
@@ -44,7 +44,7 @@ def test_over_the_pair_list(rng):
     """With enough particles for the pair list to be used."""
     many = crowd(rng, Morse(depth=1.0, alpha=30.0, cutoff=1.8), n=400)
     (state,) = loads([many], capacity=400)
-    close(state["force"], twin(many.effects[0], state), 1e-8)
+    close(state["force"], reference(many.effects[0], state), 1e-8)
     balanced(state)
 
 

@@ -11,6 +11,7 @@ from tisim.effects import Gravity
 from tisim.effects.contact.hard_rods import HardRods
 from tisim.engine.checkpoint import restore, save
 from tisim.shapes import SpherocylinderShape
+from tisim.steppers import FixedStep, Verlet
 from tisim.steppers.packing.mechanical_contraction import MechanicalContraction
 
 ROD, SPHERE = SpherocylinderShape(length=1.5, diameter=1.0), SpherocylinderShape(length=0.0, diameter=1.0)
@@ -175,6 +176,9 @@ def test_other_effects_and_domains_are_refused():
     ):
         with pytest.raises(InputError, match=message):
             Scene(**{**parts, **change})
+    rule = "stepper must be one that packs, such as mechanical_contraction, with effects.hard_rods"
+    with pytest.raises(InputError, match=rule):
+        Scene(**{**parts, "stepper": Verlet(control=FixedStep(dt=1.0))})
 
 
 def test_a_box_must_be_wide_enough_at_the_highest_density():

@@ -82,6 +82,7 @@ class MechanicalContraction(Stepper):
         "D^2", "xi over the moment of inertia of a body of mass 1, of the original method", 1.0, gt=0
     )
 
+    packs: ClassVar = True
     world_fields: ClassVar = (
         WorldField("overlapping", "sum"),
         WorldField("contractions", "counter"),
