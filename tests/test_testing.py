@@ -246,7 +246,7 @@ def is_short_ranged(kind):
     return any(type(effect) is kind and getattr(effect, "short_ranged", False) for effect in effects)
 
 
-SHORT = [kind for kind in known_effects() if is_short_ranged(kind)]
+SHORT = [kind for kind in known_effects() if kind not in extremes.PACKED and is_short_ranged(kind)]
 
 
 @pytest.mark.slow
@@ -364,7 +364,7 @@ HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 DIPOLES = [DipoleDipole, TruncatedDipoleDipole]
 APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED, *DIPOLES)
-TOGETHER = [*(kind for kind in known_effects() if kind not in APART), Outflow]
+TOGETHER = [*(kind for kind in known_effects() if kind not in (*APART, *extremes.PACKED)), Outflow]
 
 
 @pytest.mark.long
