@@ -47,7 +47,7 @@ TEMPLATES = {part: (part, base[0]) for part, base in BASES.items()} | {
 """The template of each kind of part, and the class from which its example is derived."""
 NOT_WRITTEN = {
     *("contract", "repeatable", "structure", "reaches", "turns", "offers_inverse", "acts_on_worlds"),
-    *("resolves", "countable", "min_steps", "rivals", "all_pairs", "size", "scene_of", "inverse"),
+    *("resolves", "countable", "min_steps", "rivals", "all_pairs", "packs", "size", "scene_of", "inverse"),
 }
 """Names that tisim derives from others, or that only its own parts set."""
 PREFIXES = {"s": State, "pair": Touching, "context": StepContext}
