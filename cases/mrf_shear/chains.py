@@ -31,7 +31,8 @@ CONTACT_ENDS = 0.25
 """Gap between the surfaces of two grains at which their contact has ended, as a fraction of the mean radius.
 A contact begins at CHAINED, which is smaller, so that grains that vibrate do not count as parted."""
 UNSHEARED = 1e-4
-"""Shear rate and strain of a cell that counts as not sheared, over those of the sheared one."""
+"""Ratio of the shear rate and the strain of the control, a cell that is hardly sheared, to the values of the
+sheared cell."""
 CHAINS_APART = 4
 """Smallest number of contacts on the shortest way between two grains of different chains."""
 

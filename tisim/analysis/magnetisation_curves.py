@@ -165,8 +165,8 @@ def fit_lognormal_radii(
         it, all values are taken as equally accurate, their error is estimated from the residuals, and the
         intervals use Student's t.
 
-    The intervals are first-order in the errors. They are too wide or too narrow if that of the width reaches
-    0: the curve then hardly tells a narrow distribution from equal particles.
+    The intervals are first-order in the errors. They are too wide or too narrow if the interval of the width
+    includes 0: the curve then hardly distinguishes a narrow distribution from equal particles.
 
     Source: B16 Eqs (7.5), (7.6), (7.9).
     """

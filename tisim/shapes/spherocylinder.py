@@ -17,7 +17,7 @@ class SpherocylinderShape(ParticleShape):
         I_x/m = I_y/m = (5 L^3 + 20 L^2 R + 45 L R^2 + 32 R^3) / (20 (3 L + 4 R))           (2.3)
         I_z/m = (15 L R^2 + 16 R^3) / (10 (3 L + 4 R))
 
-    Lambda is the aspect ratio. Source: R. J. Baars, thesis (Utrecht University, 2015), chapter 2.
+    Lambda is the aspect ratio. Source: R. J. Baars, thesis (Utrecht University, 2016), chapter 2.
     """
 
     length: float = parameter("m", "length L of the cylinder, without its hemispheres", examples=[4e-3], ge=0)

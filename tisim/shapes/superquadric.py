@@ -31,7 +31,7 @@ class SuperquadricShape(ParticleShape):
 
         r = (a_1^q + a_2^q + a_3^q)^(1/q),    q = 2 g/(g - 2)                                 (4.38)
 
-    Source: R. J. Baars, thesis (Utrecht University, 2015), chapter 4.
+    Source: R. J. Baars, thesis (Utrecht University, 2016), chapter 4.
     """
 
     semi_axes: Vector = parameter("m", "semi-axes a_1, a_2 and a_3", examples=[(1e-3, 1e-3, 1e-3)])

@@ -31,6 +31,8 @@ class WorldStatus(IntEnum):
     """More near pairs than their list can hold; the list is lengthened, and the world continues."""
     OUTRUN = 12
     """Grains move so far in a step that they may pass through each other undetected."""
+    OVERLAPPING = 13
+    """The overlaps of the start of a packing could not be removed."""
 
 
 NO_ONE = 2**31 - 1

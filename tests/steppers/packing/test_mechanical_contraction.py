@@ -204,3 +204,31 @@ def test_orientations_of_a_start_are_random_unless_given():
     assert np.abs((axes**2).mean(axis=0) - 1 / 3).max() < 5 * np.sqrt(4 / 45 / 400)
     other = scene(ROD, 400, seed=1).start()["orientation"]
     assert np.abs(other - made.start()["orientation"]).max() > 0.1
+
+
+def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():
+    result = run(scene(ROD, 100, 0.3, duration=3.0, method="original"))
+    assert result.status.failed
+    assert "overlaps of the start that were not removed" in result.status.reason
+
+
+def test_a_resumed_run_returns_to_its_last_configuration(tmp_path):
+    """Interrupted while overlaps remain, shortly before it gives up."""
+    made = scene(SPHERE, 100, 0.45, duration=1e5, attempts=60, volume_step=8.0, method="original", halvings=1)
+    simulation = Simulation(made, 1)
+    simulation.load([made])
+    while int(simulation.s.read("attempted")[0]) < 50 or not int(simulation.s.read("contractions")[0]):
+        simulation.run(steps=1)
+    save(simulation, tmp_path / "c.h5")
+    simulation.run()
+    (expected,) = simulation.results()
+    simulation.load([made])
+    restore(simulation, tmp_path / "c.h5")
+    simulation.run()
+    (resumed,) = simulation.results()
+    assert resumed.time == expected.time
+    same_arrays(resumed.state, expected.state)
+    assert deepest(resumed.state, made.domain.high[0], SPHERE, resumed.state["radius"][0]) <= 1e-4 * (
+        1 + 1e-9
+    )
+    simulation.close()

@@ -14,6 +14,7 @@ from tisim.numerics.vectors import product
 from tisim.pairs.listed_pairs import sum_phases
 from tisim.program.phases import PerParticle, Phase
 from tisim.state.fields import Field, WorldField
+from tisim.state.status import WorldStatus
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import BeginStep, apply_displacement
 from tisim.steppers.context import Buffer, Step, StepContext
@@ -29,11 +30,11 @@ from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 from tisim.steppers.verlet import Advance
 
 ACCEPTED_FIELDS = (
-    Field("accepted_position", "m", 3, "keep", default="position", scratch=True),
-    Field("accepted_orientation", "", 1, "keep", slots=4, scratch=True),
-    Field("accepted_radius", "m", 1, "keep", default="radius", scratch=True),
+    Field("accepted_position", "m", 3, "keep", default="position"),
+    Field("accepted_orientation", "", 1, "keep", slots=4),
+    Field("accepted_radius", "m", 1, "keep", default="radius"),
 )
-"""The last configuration without overlaps."""
+"""The last configuration without overlaps; part of checkpoints, because a run may return to it."""
 MOVE, CONTRACT, RETURN = 0, 1, 2
 """What a step does: remove overlaps, contract a configuration without overlaps, or return to the last one."""
 
@@ -184,6 +185,9 @@ class ChooseAction(Phase):
             s.halved[w] += 1
             s.volume_decrease[w] = 0.5 * s.volume_decrease[w]
             ends = s.halved[w] > self.stepper.halvings or last
+            if s.contractions[w] == 0:
+                # There is no configuration without overlaps to return to.
+                s.fail(w, WorldStatus.OVERLAPPING, 0)
         else:
             s.attempted[w] += 1
         s.growth[w] = 1.0
