@@ -66,7 +66,7 @@ class MechanicalContraction(Stepper):
     returns to its last configuration without overlaps, and contracts by half the step. It ends in that
     configuration after ``halvings``.
 
-    The original method refers to rods. Overlaps of the start are removed first.
+    The original method is for rods. Overlaps of the start are removed first.
 
     Source: B16 chapters 2 and 3; S. R. Williams, A. P. Philipse, Phys. Rev. E 67 (2003) 051301.
     """
@@ -103,6 +103,10 @@ class MechanicalContraction(Stepper):
         for effect in scene.effects:
             rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
             must(effect is bodies[0], f"effects.{effect.label}", rule, effect.kind())
+        rods = all(shape.rod() for shape in bodies[0].shapes())
+        must(
+            rods or self.method != "original", "method", "'revised' for bodies that are not rods", self.method
+        )
         low, _high = scene.domain.bounds()
         whole = low is not None and all(scene.domain.imaged())
         must(whole, "domain", f"a periodic box for {self.kind()}", scene.domain.kind())
