@@ -56,7 +56,7 @@ from .packings.orientational_order import nematic_order as nematic_order
 from .packings.orientational_order import nematic_orders as nematic_orders
 from .packings.orientational_order import random_nematic_order as random_nematic_order
 from .packings.orientational_order import random_order as random_order
-from .packings.packing import Packing as Packing
+from .packings.packed_bodies import PackedBodies as PackedBodies
 from .packings.packing_fractions import FractionProfile as FractionProfile
 from .packings.packing_fractions import body_at as body_at
 from .packings.packing_fractions import fraction_profile as fraction_profile

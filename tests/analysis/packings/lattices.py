@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tisim.analysis import Packing
+from tisim.analysis import PackedBodies
 from tisim.shapes import SphereShape
 
 CELLS = {
@@ -31,11 +31,11 @@ def lattice(name, cells=1, diameter=1.0, shape=None, low=(0.0, 0.0, 0.0)):
     sides = diameter * np.array(sides)
     steps = np.stack(np.meshgrid(*3 * [np.arange(cells)], indexing="ij"), -1).reshape(-1, 1, 3)
     places = ((steps + np.array(basis)) * sides).reshape(-1, 3) + low
-    return Packing.of(shape or SphereShape(diameter=diameter), places, low, low + cells * sides)
+    return PackedBodies.of(shape or SphereShape(diameter=diameter), places, low, low + cells * sides)
 
 
 def random_packing(rng, shape, number, side, periodic=(True, True, True)):
     """Bodies at random places in random directions, which may overlap."""
     turns = Rotation.random(number, rng=rng).as_quat(scalar_first=True)
     places = rng.uniform(0, side, (number, 3))
-    return Packing.of(shape, places, (0, 0, 0), 3 * (side,), turns, periodic=periodic)
+    return PackedBodies.of(shape, places, (0, 0, 0), 3 * (side,), turns, periodic=periodic)

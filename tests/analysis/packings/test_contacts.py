@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.analysis.packings.lattices import CONTACTS, lattice, random_packing
 from tisim import InputError
-from tisim.analysis import Packing, contact_numbers, near_gaps, radial_distribution
+from tisim.analysis import PackedBodies, contact_numbers, near_gaps, radial_distribution
 from tisim.shapes import EllipsoidShape, SphereShape, SpherocylinderShape, SuperquadricShape
 
 
@@ -35,7 +35,7 @@ def test_gaps_of_rods_are_distances_of_segments(rng, periodic):
     rod = SpherocylinderShape(length=2.0, diameter=0.6)
     packing = random_packing(rng, rod, 40, 4.0, periodic)
     scale = np.where(rng.random(40) < 0.5, 1.0, 0.5)
-    packing = Packing.of(
+    packing = PackedBodies.of(
         rod, packing.position, packing.low, packing.high, packing.orientation, scale, periodic
     )
     found = near_gaps(packing, 0.2)
@@ -66,11 +66,11 @@ def test_ellipsoids_that_are_stretched_spheres_touch_as_these(rng):
     spheres = lattice("fcc", 2)
     stretch = np.array([1.0, 1.0, 1.7])
     shape = EllipsoidShape(semi_axes=tuple(0.5 * stretch))
-    packing = Packing.of(shape, spheres.position * stretch, spheres.low, spheres.high * stretch)
+    packing = PackedBodies.of(shape, spheres.position * stretch, spheres.low, spheres.high * stretch)
     assert len(near_gaps(packing, 1e-9).pairs) == 6 * len(packing)
     # In a turned frame the same: a body turned by 90 degrees about x in a cell turned with it.
     quarter = Rotation.from_rotvec([np.pi / 2, 0, 0])
-    turned = Packing.of(
+    turned = PackedBodies.of(
         shape,
         quarter.apply(packing.position) - [0, packing.low[2] - packing.high[2], 0],
         (0, 0, 0),
@@ -90,7 +90,7 @@ def test_superballs_in_a_cubic_lattice_touch_by_their_faces():
 def test_one_file_of_rods_touches_itself():
     """A single rod in a periodic box as long as itself: two contacts, both with its own image."""
     rod = SpherocylinderShape(length=3.0, diameter=1.0)
-    packing = Packing.of(rod, [[0, 0, 1.0]], (-1, -1, 0), (1, 1, 4.0), periodic=(False, False, True))
+    packing = PackedBodies.of(rod, [[0, 0, 1.0]], (-1, -1, 0), (1, 1, 4.0), periodic=(False, False, True))
     numbers = contact_numbers(packing)
     np.testing.assert_array_equal(numbers.mean, 2.0)
     assert numbers.rattlers[0] == 1
@@ -109,7 +109,7 @@ def test_contact_numbers_are_extrapolated_to_contact(rng):
     x[:number, 1], x[number:, 1] = diameter + gap[order], diameter
     position = np.zeros((4 * number, 3))
     position[:, 0], position[:, 1] = x.ravel(), np.repeat(np.arange(2 * number), 2) * 3 * diameter
-    packing = Packing.of(
+    packing = PackedBodies.of(
         SphereShape(diameter=diameter),
         position,
         (-1, -1, -1),
@@ -131,7 +131,7 @@ def test_rattlers_are_left_out():
     direction = np.array([1.0, 1, 1]) / np.sqrt(3)
     loose = hole - (np.sqrt(3) / 2 - 0.5 - 0.2) * direction
     scale = np.append(np.ones(27), 0.4)
-    packing = Packing.of(
+    packing = PackedBodies.of(
         SphereShape(diameter=1.0),
         np.vstack([crystal.position, loose]),
         crystal.low,
@@ -150,16 +150,16 @@ def test_wrong_packings_are_refused():
     cube = SuperquadricShape(semi_axes=(0.5,) * 3, exponents=(6.0,) * 3)
     one = lattice("sc", 2)
     with pytest.raises(InputError, match="scale must be above 0; received 0"):
-        Packing.of(ball, one.position, one.low, one.high, scale=0.0)
+        PackedBodies.of(ball, one.position, one.low, one.high, scale=0.0)
     with pytest.raises(InputError, match="orientation must be unit quaternions"):
-        Packing.of(ball, one.position, one.low, one.high, orientation=(1, 1, 0, 0))
+        PackedBodies.of(ball, one.position, one.low, one.high, orientation=(1, 1, 0, 0))
     with pytest.raises(InputError, match="low must be below high along all axes"):
-        Packing.of(ball, one.position, one.high, one.low)
+        PackedBodies.of(ball, one.position, one.high, one.low)
     with pytest.raises(InputError, match="cutoffs must be at least three different numbers from 0 on"):
         contact_numbers(one, [1e-5, 1e-6])
     kinds = np.arange(8) % 2
-    both = Packing(one.position, one.orientation, kinds, one.scale, (rod, cube), one.low, one.high)
+    both = PackedBodies(one.position, one.orientation, kinds, one.scale, (rod, cube), one.low, one.high)
     with pytest.raises(InputError, match="shapes must be all rods or spheres, or all superquadrics"):
         near_gaps(both, 0.1)
     with pytest.raises(InputError, match="shape must be indices below 1"):
-        Packing(one.position, one.orientation, kinds, one.scale, (ball,), one.low, one.high)
+        PackedBodies(one.position, one.orientation, kinds, one.scale, (ball,), one.low, one.high)

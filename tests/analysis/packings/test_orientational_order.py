@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from tests.analysis.packings.lattices import lattice
 from tisim import InputError
 from tisim.analysis import (
-    Packing,
+    PackedBodies,
     cubatic_order,
     nematic_order,
     nematic_orders,
@@ -20,7 +20,9 @@ from tisim.shapes import SphereShape, SpherocylinderShape
 def turned(turns):
     """A packing of bodies with these orientations."""
     number, ball = len(turns), SphereShape(diameter=1.0)
-    return Packing.of(ball, np.zeros((number, 3)), (0, 0, 0), (1, 1, 1), turns.as_quat(scalar_first=True))
+    return PackedBodies.of(
+        ball, np.zeros((number, 3)), (0, 0, 0), (1, 1, 1), turns.as_quat(scalar_first=True)
+    )
 
 
 def whole_group():

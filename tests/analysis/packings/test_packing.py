@@ -5,7 +5,7 @@ import pytest
 
 from tests.analysis.packings.lattices import lattice
 from tisim import Box, InputError, Open, Particles, Scene, run
-from tisim.analysis import Packing, contact_numbers, near_gaps, packing_fraction, relative_gaps
+from tisim.analysis import PackedBodies, contact_numbers, near_gaps, packing_fraction, relative_gaps
 from tisim.effects import HardRods
 from tisim.shapes import SpherocylinderShape
 from tisim.steppers import MechanicalContraction
@@ -27,7 +27,7 @@ def test_the_packing_at_the_end_of_a_contraction(rng):
         particles=particles, effects=[HardRods(rods=(rod,))], domain=box, duration=1e5, stepper=stepper
     )
     result = run(scene).check()
-    packing = Packing.from_result(result)
+    packing = PackedBodies.from_result(result)
     growth = result.state["radius"][0] / particles.radius[0]
     start = rod.volume() * (scale**3).sum() / side**3
     assert packing_fraction(packing) == pytest.approx(start * growth**3, rel=1e-12)
@@ -45,13 +45,13 @@ def test_particles_without_shapes_are_spheres(rng):
     )
     box = Box(low=tuple(made.low), high=tuple(made.high), periodic=(True, True, False))
     scene = Scene(particles=particles, domain=box, duration=1e-9)
-    packing = Packing.from_result(run(scene).check())
+    packing = PackedBodies.from_result(run(scene).check())
     assert packing.periodic == (True, True, False)
     np.testing.assert_allclose(packing.bounding_radii(), 1e-3, rtol=1e-15)
     # Four of the twelve contacts of a sphere in the lowest layer are lost at each open face.
     assert 2 * len(near_gaps(packing, 1e-9).pairs) == 12 * 32 - 2 * 4 * 8
     with pytest.raises(InputError, match="domain must be a box that is not sheared; received"):
-        Packing.from_result(run(Scene(particles=particles, domain=Open(), duration=1e-9)).check())
+        PackedBodies.from_result(run(Scene(particles=particles, domain=Open(), duration=1e-9)).check())
 
 
 @pytest.mark.parametrize("reach", [0.3, 1.0, 3.7])
@@ -59,7 +59,7 @@ def test_all_images_within_reach_of_the_box(rng, reach):
     """Against a search of many images."""
     made = lattice("sc", 1)
     position = rng.uniform(-2, 3, (5, 3))
-    packing = Packing.of(made.shapes[0], position, (-1, 0, 1), (1, 1, 2.5), periodic=(True, False, True))
+    packing = PackedBodies.of(made.shapes[0], position, (-1, 0, 1), (1, 1, 2.5), periodic=(True, False, True))
     places, index = packing.images(reach)
     steps = np.stack(np.meshgrid(np.arange(-5, 6), [0], np.arange(-5, 6), indexing="ij"), -1).reshape(
         -1, 1, 3

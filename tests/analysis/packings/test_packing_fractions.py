@@ -5,7 +5,7 @@ import pytest
 
 from tests.analysis.packings.lattices import FRACTION, lattice, random_packing
 from tisim import InputError
-from tisim.analysis import Packing, body_at, fraction_profile, packing_fraction, sampled_fraction
+from tisim.analysis import PackedBodies, body_at, fraction_profile, packing_fraction, sampled_fraction
 from tisim.geometry import CylindricalSurface, Plane
 from tisim.shapes import EllipsoidShape, SphereShape, SpherocylinderShape, SuperquadricShape
 
@@ -28,7 +28,7 @@ def test_the_bodies_at_points(rng):
     made = random_packing(rng, shapes[0], 12, 1.5, (True, True, False))
     scale = rng.uniform(0.5, 1.0, 12)
     kinds = np.arange(12) % 2
-    packing = Packing(
+    packing = PackedBodies(
         made.position, made.orientation, kinds, scale, shapes, made.low, made.high, made.periodic
     )
     points = rng.uniform(-2, 3, (4000, 3))
@@ -53,7 +53,7 @@ def test_intervals_contain_the_fraction_as_often_as_they_should():
 def test_a_sphere_at_a_wall():
     """Up to a height h a sphere on a plane has pi h^2 (3 R - h)/3 of its volume."""
     ball = SphereShape(diameter=2.0)
-    packing = Packing.of(ball, [[0, 0, 1.0]], (-1, -1, 0), (1, 1, 4), periodic=(True, True, False))
+    packing = PackedBodies.of(ball, [[0, 0, 1.0]], (-1, -1, 0), (1, 1, 4), periodic=(True, True, False))
     edges = np.array([-1.0, 0.0, 0.5, 1.0, 2.0, 3.0])
     found = fraction_profile(packing, Plane(), edges, points=100_000)
     caps = np.pi * edges[1:5] ** 2 * (3 - edges[1:5]) / 3
@@ -69,7 +69,9 @@ def test_a_sphere_at_a_wall():
 def test_one_file_of_rods_in_a_cylinder():
     """B16: (4 R/3 + L)/(2 R + L) of the cylinder is filled."""
     rod = SpherocylinderShape(length=2.0, diameter=1.0)
-    packing = Packing.of(rod, [[0, 0, 1.5]], (-0.5, -0.5, 0), (0.5, 0.5, 3.0), periodic=(False, False, True))
+    packing = PackedBodies.of(
+        rod, [[0, 0, 1.5]], (-0.5, -0.5, 0), (0.5, 0.5, 3.0), periodic=(False, False, True)
+    )
     expected = (4 / 3 * 0.5 + 2) / 3
     assert packing_fraction(packing, np.pi / 4 * 3) == pytest.approx(expected, rel=1e-14)
     found = sampled_fraction(packing, lambda r: np.hypot(r[:, 0], r[:, 1]) < 0.5, points=100_000)
@@ -84,7 +86,7 @@ def test_one_file_of_rods_in_a_cylinder():
 
 def test_wrong_regions_are_refused():
     packing = lattice("sc", 1)
-    open_box = Packing.of(
+    open_box = PackedBodies.of(
         packing.shapes[0], packing.position, (0, 0, 0), (1, 1, 1), periodic=(True, True, False)
     )
     with pytest.raises(InputError, match="periodic must be true along all axes without a volume"):

@@ -12,11 +12,11 @@ from scipy.stats import t as student
 from tisim.analysis.beds import FEWEST_CONTACTS, rattling
 from tisim.analysis.flow_curves import Estimate
 from tisim.analysis.packings.gaps import near_gaps, relative_gaps
-from tisim.analysis.packings.packing import Packing
+from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.errors import must
 from tisim.numerics.statistics import CONFIDENCE
 
-CUTOFFS = tuple(np.geomspace(1e-8, 1e-5, 31).tolist())
+CONTACT_CUTOFFS = tuple(np.geomspace(1e-8, 1e-5, 31).tolist())
 """Cut-offs of B16 2.2.5, in D."""
 
 
@@ -42,7 +42,7 @@ class ContactNumbers(NamedTuple):
 
 
 def contact_numbers(
-    packing: Packing, cutoffs: ArrayLike = CUTOFFS, fewest: int = FEWEST_CONTACTS
+    packing: PackedBodies, cutoffs: ArrayLike = CONTACT_CUTOFFS, fewest: int = FEWEST_CONTACTS
 ) -> ContactNumbers:
     """Return mean contact numbers of a packing: twice the number of pairs with a gap of at most a cut-off,
     over the number of bodies, for at least three cut-offs (in D). Pairs that overlap are in contact.

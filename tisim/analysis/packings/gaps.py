@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tisim.analysis.packings.packing import Packing
+from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
@@ -31,7 +31,7 @@ class Gaps(NamedTuple):
     separation: np.ndarray
 
 
-def near_gaps(packing: Packing, reach: float) -> Gaps:
+def near_gaps(packing: PackedBodies, reach: float) -> Gaps:
     """Return all pairs of bodies with a gap between surfaces of at most ``reach`` (m), across periodic faces
     too.
 
@@ -46,12 +46,12 @@ def near_gaps(packing: Packing, reach: float) -> Gaps:
     return Gaps(pairs, found[near, 0], found[near, 1:], separation[near])
 
 
-def relative_gaps(packing: Packing, gaps: Gaps) -> np.ndarray:
+def relative_gaps(packing: PackedBodies, gaps: Gaps) -> np.ndarray:
     """Return gaps over D of the smaller body of each pair, shape (m,)."""
     return np.asarray(gaps.gap / packing.diameters()[gaps.pairs].min(axis=1))
 
 
-def _candidates(packing: Packing, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _candidates(packing: PackedBodies, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the bodies i <= j of the pairs whose bounding spheres are at most ``reach`` (m) apart, and their
     separations (m)."""
     number, half = len(packing), packing.bounding_radii() + reach / 2
@@ -72,7 +72,7 @@ def _candidates(packing: Packing, reach: float) -> tuple[np.ndarray, np.ndarray,
 
 
 def _closest(
-    packing: Packing, i: np.ndarray, j: np.ndarray, separation: np.ndarray, reach: float
+    packing: PackedBodies, i: np.ndarray, j: np.ndarray, separation: np.ndarray, reach: float
 ) -> np.ndarray:
     """Return gap (m) and normal of each pair, shape (m, 4)."""
     out = np.zeros((len(i), 4))

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tisim.analysis.chains import orientation_tensor
-from tisim.analysis.packings.packing import Packing
+from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.errors import must
 
-STARTS = 100
+DIRECTIONS = 100
 """Directions from which the director of cubatic order is sought. For 200 sets of 3 to 400 random orientations
 60 and 5000 directions gave the same maximum."""
 ASCENTS = 2000
@@ -59,7 +59,7 @@ def random_nematic_order(number: int) -> float:
     return float(4.5 / np.sqrt(10 * np.pi * number))
 
 
-def nematic_orders(packing: Packing) -> tuple[NematicOrder, NematicOrder, NematicOrder]:
+def nematic_orders(packing: PackedBodies) -> tuple[NematicOrder, NematicOrder, NematicOrder]:
     """Return S2 and its director for the axes x, y and z of the bodies.
 
         S2_j = max over n of 1/N sum_i (3/2 (u_ij . n)^2 - 1/2)                              (4.16)
@@ -74,7 +74,7 @@ def nematic_orders(packing: Packing) -> tuple[NematicOrder, NematicOrder, Nemati
     return x, y, z
 
 
-def cubatic_order(packing: Packing) -> NematicOrder:
+def cubatic_order(packing: PackedBodies) -> NematicOrder:
     """Return the cubatic order parameter S4 of the axes u_ij of the bodies, and its director n.
 
         S4 = max over n of 1/(14 N) sum_ij (35 (u_ij . n)^4 - 30 (u_ij . n)^2 + 3)            (4.17)
@@ -82,7 +82,7 @@ def cubatic_order(packing: Packing) -> NematicOrder:
     It is 1 if all axes are along three directions; at N random orientations it is about 0.97/sqrt(N) on
     average (``random_order``). As the axes of a body are orthogonal, S4 = 5/2 A - 3/2 with the mean A of
     sum_j (u_ij . n)^4. A is convex, so that steps to the direction of its gradient increase it; they are made
-    from ``STARTS`` directions, in place of the random directions of B16.
+    from ``DIRECTIONS`` directions, in place of the random directions of B16.
 
     Source: B16 (4.17), after Batten et al. (2010); for the steps E. Kofidis, P. A. Regalia, SIAM J. Matrix
     Anal. Appl. 23 (2002) 863.
@@ -109,7 +109,7 @@ def _cubatic_order(axes: np.ndarray) -> NematicOrder:
     squares = np.einsum("na,nb->nab", u, u).reshape(-1, 9)
     # A as a form of the products of the components of n.
     form = squares.T @ squares * (3 / len(u))
-    n = _half_sphere(STARTS)
+    n = _half_sphere(DIRECTIONS)
     before = np.zeros(len(n))
     for _ in range(ASCENTS):
         products = np.einsum("na,nb->nab", n, n).reshape(-1, 9)

@@ -10,14 +10,14 @@ from scipy.spatial import cKDTree
 from scipy.stats import norm
 
 from tisim.analysis.flow_curves import Estimate
-from tisim.analysis.packings.packing import Packing
+from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.errors import is_whole, must
 from tisim.geometry.shape import Shape
 from tisim.numerics.statistics import CONFIDENCE
 
 POINTS = 200_000
 """Number of sampled points. A packing fraction of 0.6 then has an interval of +- 0.002."""
-PAIRS_AT_ONCE = 2_000_000
+TESTS_AT_ONCE = 2_000_000
 """Pairs of a point and a bounding sphere that are tested at once, which take 200 MB."""
 
 
@@ -35,7 +35,7 @@ class FractionProfile(NamedTuple):
     points: np.ndarray
 
 
-def packing_fraction(packing: Packing, volume: float | None = None) -> float:
+def packing_fraction(packing: PackedBodies, volume: float | None = None) -> float:
     """Return the volume of all bodies over the volume of the box, or over ``volume`` (m^3) of a container of
     another form that holds all of them. A volume that two bodies overlap in counts twice.
 
@@ -49,7 +49,7 @@ def packing_fraction(packing: Packing, volume: float | None = None) -> float:
     return float(packing.volumes().sum() / (packing.box_volume if volume is None else volume))
 
 
-def body_at(packing: Packing, points: np.ndarray) -> np.ndarray:
+def body_at(packing: PackedBodies, points: np.ndarray) -> np.ndarray:
     """Return the index of a body that contains each point (m, shape (m, 3)), -1 in pores, shape (m,).
 
     Periodic images count. In an overlap the body of the largest index is returned.
@@ -83,12 +83,12 @@ def body_at(packing: Packing, points: np.ndarray) -> np.ndarray:
 def _parts(tree: cKDTree, points: np.ndarray, reach: float) -> Iterator[np.ndarray]:
     """Yield the indices of points, in parts near to not too many centres."""
     number = tree.query_ball_point(points, reach, return_length=True)
-    part = np.cumsum(number) // PAIRS_AT_ONCE
+    part = np.cumsum(number) // TESTS_AT_ONCE
     yield from np.split(np.arange(len(points)), np.flatnonzero(np.diff(part)) + 1)
 
 
 def sampled_fraction(
-    packing: Packing,
+    packing: PackedBodies,
     region: Callable[[np.ndarray], np.ndarray] | None = None,
     points: int = POINTS,
     seed: int = 0,
@@ -110,7 +110,7 @@ def sampled_fraction(
 
 
 def fraction_profile(
-    packing: Packing, surface: Shape, edges: np.ndarray, points: int = POINTS, seed: int = 0
+    packing: PackedBodies, surface: Shape, edges: np.ndarray, points: int = POINTS, seed: int = 0
 ) -> FractionProfile:
     """Return the packing fraction in layers between distances (m, increasing) from a surface, such as a
     ``Plane`` or a ``CylindricalSurface``.
@@ -129,7 +129,7 @@ def fraction_profile(
     return FractionProfile(edges, fraction, _half(fraction, number), number)
 
 
-def _sample(packing: Packing, points: int, seed: int) -> np.ndarray:
+def _sample(packing: PackedBodies, points: int, seed: int) -> np.ndarray:
     """Return random points in the box (m), shape (points, 3)."""
     must(is_whole(points, 1), "points", "a whole number, at least 1", points)
     return np.random.default_rng(seed).uniform(packing.low, packing.high, (points, 3))

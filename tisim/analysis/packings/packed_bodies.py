@@ -1,4 +1,4 @@
-"""A packing of bodies, which all its measures take."""
+"""The bodies of a packing, which all its measures take."""
 
 from __future__ import annotations
 
@@ -14,16 +14,14 @@ from tisim.domains.domain import Axes
 from tisim.effects.base import HardBodies
 from tisim.engine.result import Result
 from tisim.errors import must
+from tisim.packing.region import ALL_AXES
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.sphere import SphereShape
 
-ALL_AXES: Axes = (True, True, True)
-"""A box that is periodic along all axes."""
-
 
 @dataclass(frozen=True)
-class Packing:
-    """A packing is a number of bodies in a box, and each body is a copy of a shape.
+class PackedBodies:
+    """The bodies of a packing: copies of shapes, each with its place, orientation and scale in a box.
 
     position : centres of the bodies, m, shape (n, 3).
     orientation : unit quaternions (w, x, y, z) from the frame of the shape to space, shape (n, 4).
@@ -33,9 +31,9 @@ class Packing:
     low, high : corners of the box, m, shape (3,).
     periodic : the axes along which the packing continues periodically.
 
-    ``Packing.of`` fills in what all bodies have in common, and ``Packing.from_result`` takes the end of a
-    run. Measures in units of D take the shortest side of the box around a body (the diameter of a rod), and
-    for a pair the smaller one.
+    ``of`` makes a packing of bodies of one shape, and ``from_result`` takes the end of a run. Measures in
+    units of D take the shortest side of the box around a body (the diameter of a rod), and for a pair the
+    smaller one.
     """
 
     position: np.ndarray
