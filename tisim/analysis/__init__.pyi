@@ -44,6 +44,11 @@ from .magnetisation_curves import fit_radius_classes as fit_radius_classes
 from .magnetisation_curves import lognormal_magnetisation as lognormal_magnetisation
 from .magnetisation_curves import magnetic_radius as magnetic_radius
 from .mean import Mean as Mean
+from .packings.bond_order import BondOrder as BondOrder
+from .packings.bond_order import Bonds as Bonds
+from .packings.bond_order import bond_order as bond_order
+from .packings.bond_order import contact_bonds as contact_bonds
+from .packings.bond_order import voronoi_bonds as voronoi_bonds
 from .packings.contact_numbers import ContactNumbers as ContactNumbers
 from .packings.contact_numbers import contact_numbers as contact_numbers
 from .packings.gaps import Gaps as Gaps
@@ -76,5 +81,7 @@ from .stress import stress_on_wall as stress_on_wall
 from .stress import stress_profile as stress_profile
 from .stress import stress_tensor as stress_tensor
 from .voronoi import ShellVolumes as ShellVolumes
+from .voronoi import VoronoiFacets as VoronoiFacets
 from .voronoi import voronoi_by_shell as voronoi_by_shell
+from .voronoi import voronoi_facets as voronoi_facets
 from .voronoi import voronoi_volumes as voronoi_volumes
