@@ -67,6 +67,10 @@ from .packings.packing_fractions import body_at as body_at
 from .packings.packing_fractions import fraction_profile as fraction_profile
 from .packings.packing_fractions import packing_fraction as packing_fraction
 from .packings.packing_fractions import sampled_fraction as sampled_fraction
+from .packings.wall_alignment import DirectionHistogram as DirectionHistogram
+from .packings.wall_alignment import WallAlignment as WallAlignment
+from .packings.wall_alignment import direction_histogram as direction_histogram
+from .packings.wall_alignment import wall_alignment as wall_alignment
 from .profiles import granular_temperature as granular_temperature
 from .profiles import layer_means as layer_means
 from .radial_distribution import radial_distribution as radial_distribution
