@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ def body_at(packing: PackedBodies, points: np.ndarray) -> np.ndarray:
     for some in _parts(tree, inside, widest):
         near = tree.query_ball_point(inside[some], widest)
         count = np.fromiter(map(len, near), int, len(some))
-        image = np.concatenate([np.asarray(one, int) for one in near])
+        image = np.fromiter(chain.from_iterable(near), int, int(count.sum()))
         point, body = np.repeat(some, count), index[image]
         away = inside[point] - places[image]
         hit = np.zeros(len(point), bool)
