@@ -3,6 +3,8 @@ from .cone import ConicalSurface as ConicalSurface
 from .container import Container as Container
 from .cylinder import CylindricalSurface as CylindricalSurface
 from .disc import Disc as Disc
+from .flat_containers import BoxContainer as BoxContainer
+from .flat_containers import WedgeContainer as WedgeContainer
 from .plane import Plane as Plane
 from .revolved import (
     Barrel as Barrel,
