@@ -1,4 +1,7 @@
 from .base import (
+    Confinement as Confinement,
+)
+from .base import (
     Constraint as Constraint,
 )
 from .base import (

@@ -23,6 +23,9 @@ from .placement import (
 from .placement import (
     RandomSequential as RandomSequential,
 )
+from .random_bodies import RandomBodies as RandomBodies
+from .random_bodies import random_bodies as random_bodies
+from .random_bodies import wall_gaps as wall_gaps
 from .size_laws import EqualSizes as EqualSizes
 from .size_laws import LognormalSizes as LognormalSizes
 from .size_laws import NormalSizes as NormalSizes

@@ -42,7 +42,8 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    depends on the values of all other particles. A ``LongRange`` effect sums over all particles by other means
    than pairs, such as a tree of cells or waves. Its phases run before forces are summed, or in each sweep of
    a ``SelfConsistentQuantity``; its ``force`` or ``response`` reads the result from ``self.sum``.
-   ``HardBodies`` have shapes and exert no forces; packing steppers remove their overlaps.
+   ``HardBodies`` have shapes and exert no forces; packing steppers remove their overlaps, and those with the
+   walls of a ``Confinement``.
 8. An ``Operator`` changes the state between steps, and an ``AddsParticles`` also adds particles (see
    tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It receives each pair in ``contact`` with exclusive access
@@ -77,6 +78,7 @@ Rules of Taichi for a method with ``ti.func``:
 """
 
 from tisim.components.component import Vector, option, parameter
+from tisim.effects.base.confinement import Confinement
 from tisim.effects.base.constraint import Constraint
 from tisim.effects.base.derived_quantity import DerivedQuantity, SelfConsistentQuantity
 from tisim.effects.base.effect import Effect, SceneParts
@@ -89,6 +91,7 @@ from tisim.effects.base.pairwise import Pairwise
 from tisim.state.fields import Field, WorldField
 
 __all__ = [
+    "Confinement",
     "Constraint",
     "DerivedQuantity",
     "Effect",

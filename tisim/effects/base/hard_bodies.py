@@ -9,9 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tisim.backend.taichi import ti
+from tisim.effects.base.confinement import Confinement, confinement
 from tisim.effects.base.effect import SceneParts
 from tisim.effects.base.pairwise import Pairwise
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.numerics.vectors import rotated
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.state.fields import Field
@@ -33,12 +34,14 @@ class HardBodies(Pairwise):
     exerts no force: a packing stepper moves and turns bodies until none overlap.
 
     unit : the shortest side D of the box around the first shape. Packing steppers measure lengths in it.
+    round_ends : whether each body is the hull of spheres, its ends, so that it touches curved walls there.
     """
 
     contract: ClassVar[bool] = True
     short_ranged: ClassVar = True
     memory: ClassVar[int] = 0
     fields: ClassVar = (ORIENTATION, SHAPE)
+    round_ends: ClassVar[bool] = False
 
     def shapes(self) -> Sequence[ParticleShape]:
         """Return the shapes; the field ``shape`` of a particle is an index into them."""
@@ -72,17 +75,46 @@ class HardBodies(Pairwise):
         low, high = scene.domain.bounds()
         if low is None or high is None or not len(lengths):
             return
-        kinds = start[SHAPE.name]
-        sizes = start["radius"] / np.array([one.bounding_radius() for one in shapes])[kinds]
+        around, kinds = confinement(scene), start[SHAPE.name]
+        sizes = self.sizes(start)
+        scaled, space = (False, False, False), float(np.prod(high - low))
+        if around is not None:
+            container = around.container
+            scaled, space = container.scaled(), container.volume_in(high - low, self.unit_of(start))
+            equal = not any(scaled) or float(np.ptp(sizes)) <= LENGTH_TOLERANCE * float(sizes.max())
+            rule = f"in one ratio to their shapes, as the {container.kind()} grows with them"
+            must(equal, "particles.radius", rule, float(sizes.max() / sizes.min()))
         volume = float((np.array([one.volume() for one in shapes])[kinds] * sizes**3).sum())
-        # In a box of this density two bodies must not touch on both sides at once.
-        side = float((high - low).min()) * (volume / (DENSEST_PACKING * float(np.prod(high - low)))) ** (
-            1 / 3
-        )
+        joined, contracted = np.array(scene.domain.joined()), 3 - sum(scaled)
+        if not joined.any():
+            return
+        # At this density two bodies must not touch on both sides at once.
+        growth = (DENSEST_PACKING * space / volume) ** (1 / contracted)
+        side = float((high - low)[joined].min()) / growth
         longest = 2 * float(start["radius"].max())
         wide = f"at least {2 * longest:.4g} m wide at a packing fraction of {DENSEST_PACKING:g}"
         rule = f"{wide}, twice the length of a body (take more bodies)"
         must(side >= 2 * longest, "box", rule, side)
+
+    def sizes(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the size of each body of a start over the size of its shape, shape (n,)."""
+        bounding = np.array([one.bounding_radius() for one in self.shapes()])
+        ratio: np.ndarray = start["radius"] / bounding[start[SHAPE.name]]
+        return ratio
+
+    def unit_of(self, start: Mapping[str, np.ndarray]) -> float:
+        """Return D (m) at a start."""
+        return 2 * float(self.shapes()[0].half_extents().min()) * float(self.sizes(start)[0])
+
+    def check(self, scene: SceneParts) -> None:
+        walls = [effect for effect in scene.effects if isinstance(effect, Confinement)]
+        for around in walls:
+            container, name = around.container.kind(), f"effects.{around.label}"
+            must(len(walls) == 1, name, "the only confinement of a scene", Words(f"{len(walls)} of them"))
+            rule = f"rods or spheres in a {container}, which touch curved walls with round ends"
+            must(self.round_ends or not around.container.curved, f"effects.{self.label}", rule, self.kind())
+            known = self.offers("support") and (around.treatment == "exact" or self.offers("closest_virtual"))
+            must(known, f"{name}.treatment", f"one for {self.kind()}", around.treatment)
 
     @ti.func
     def size(self, s, w, i):
@@ -129,3 +161,29 @@ class HardBodies(Pairwise):
         """Return whether the gap between two bodies is wider than ``gap`` (m)."""
         found, _normal, _here, _there = self.closest(s, w, i, j, separation)
         return found > gap
+
+    @ti.func
+    def end_count(self, s, w, i):
+        """Return the number of convex ends whose hull is the body: 2 for a rod, which may touch a wall with
+        both, and 1 for a body that is its own end."""
+        return 1
+
+    @ti.func
+    def end_centre(self, s, w, i, k):
+        """Return the centre of end k (m), relative to the centre of the body."""
+        return 0.0 * s.position[w, i]
+
+    @ti.func
+    def support(self, s, w, i, k, direction):
+        """Return the farthest point of end k along a unit vector (m), relative to the centre of the body."""
+        return direction
+
+    @ti.func
+    def closest_virtual(self, s, w, i, point, outward, along):
+        """Return gap, normal and points of contact, as ``closest``, of a body and a virtual one: a copy of it
+        with its z axis along the unit vector ``along``, beyond a wall that it touches.
+
+        point : of the wall at which it touches (m, relative to the centre of the body). outward : unit normal
+            of the wall there, towards the virtual body.
+        """
+        return point[0], point, point, point

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
@@ -19,6 +20,8 @@ class HardRods(HardBodies):
     Source: B16 section 2.2.2.
     """
 
+    round_ends: ClassVar = True
+
     rods: tuple[SpherocylinderShape, ...] = option(
         "the shapes of the rods", examples=[(SpherocylinderShape(length=4e-3, diameter=1e-3),)], min_length=1
     )
@@ -28,15 +31,46 @@ class HardRods(HardBodies):
 
     @ti.func
     def closest(self, s, w, i, j, separation):
-        here, there, along = s.shape[w, i], s.shape[w, j], 0.0 * separation
-        along[2] += 1.0
-        a, b = self.size(s, w, i), self.size(s, w, j)
         return closest_rods(
             separation,
-            rotated(self.turn(s, w, i), along),
-            0.5 * a * self.rods.length(w, here),
-            0.5 * a * self.rods.diameter(w, here),
-            rotated(self.turn(s, w, j), along),
-            0.5 * b * self.rods.length(w, there),
-            0.5 * b * self.rods.diameter(w, there),
+            self.axis(s, w, i),
+            self.half(s, w, i),
+            self.thickness(s, w, i),
+            self.axis(s, w, j),
+            self.half(s, w, j),
+            self.thickness(s, w, j),
         )
+
+    @ti.func
+    def axis(self, s, w, i):
+        """Return the unit vector along a rod."""
+        along = 0.0 * s.position[w, i]
+        along[2] += 1.0
+        return rotated(self.turn(s, w, i), along)
+
+    @ti.func
+    def half(self, s, w, i):
+        """Return half the length (m) of the segment of a rod."""
+        return 0.5 * self.size(s, w, i) * self.rods.length(w, s.shape[w, i])
+
+    @ti.func
+    def thickness(self, s, w, i):
+        """Return the radius (m) of a rod, half its diameter."""
+        return 0.5 * self.size(s, w, i) * self.rods.diameter(w, s.shape[w, i])
+
+    @ti.func
+    def end_count(self, s, w, i):
+        return ti.select(self.half(s, w, i) > 0.0, 2, 1)
+
+    @ti.func
+    def end_centre(self, s, w, i, k):
+        return ti.select(k == 0, 1.0, -1.0) * self.half(s, w, i) * self.axis(s, w, i)
+
+    @ti.func
+    def support(self, s, w, i, k, direction):
+        return self.end_centre(s, w, i, k) + self.thickness(s, w, i) * direction
+
+    @ti.func
+    def closest_virtual(self, s, w, i, point, outward, along):
+        half, radius = self.half(s, w, i), self.thickness(s, w, i)
+        return closest_rods(point + radius * outward, self.axis(s, w, i), half, radius, along, half, radius)

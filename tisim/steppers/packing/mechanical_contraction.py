@@ -7,7 +7,8 @@ from typing import Any, ClassVar, Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option, parameter
-from tisim.effects.base import Effect, HardBodies, SceneParts
+from tisim.effects.base import Confinement, Effect, HardBodies, SceneParts
+from tisim.effects.base.confinement import confinement
 from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.numerics.vectors import product
@@ -26,6 +27,7 @@ from tisim.steppers.packing.overlaps import (
     RemovalRates,
     SumOverlaps,
 )
+from tisim.steppers.packing.space import PackingSpace
 from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 from tisim.steppers.verlet import Advance
 
@@ -62,7 +64,8 @@ class MechanicalContraction(Stepper):
 
     One step is one attempt to remove all overlaps; it takes the time ``dt`` of the control, so the duration
     of a run is the largest number of attempts. The box keeps its size and the bodies grow, which is the same
-    as a contracting box up to the scale of all lengths. If overlaps remain after ``attempts``, the world
+    as a contracting box up to the scale of all lengths. A cylinder or a wedge grows with the bodies, except
+    along its periodic axis. If overlaps remain after ``attempts``, the world
     returns to its last configuration without overlaps, and contracts by half the step. It ends in that
     configuration after ``halvings``.
 
@@ -102,14 +105,16 @@ class MechanicalContraction(Stepper):
              [effect.label for effect in scene.effects])  # fmt: skip
         for effect in scene.effects:
             rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
-            must(effect is bodies[0], f"effects.{effect.label}", rule, effect.kind())
+            packed = effect is bodies[0] or isinstance(effect, Confinement)
+            must(packed, f"effects.{effect.label}", rule, effect.kind())
         rods = all(shape.rod() for shape in bodies[0].shapes())
-        must(
-            rods or self.method != "original", "method", "'revised' for bodies that are not rods", self.method
-        )
+        suited = rods or self.method != "original"
+        must(suited, "method", "'revised' for bodies that are not rods", self.method)
         low, _high = scene.domain.bounds()
-        whole = low is not None and all(scene.domain.imaged())
-        must(whole, "domain", f"a periodic box for {self.kind()}", scene.domain.kind())
+        # A confinement checks the axes of its box.
+        closed = low is not None and (all(scene.domain.imaged()) or confinement(scene) is not None)
+        rule = f"a periodic box for {self.kind()}, or one with an effect confinement"
+        must(closed, "domain", rule, scene.domain.kind())
 
     def independent(self, effects: Sequence[Effect]) -> bool:
         return False
@@ -133,18 +138,18 @@ class MechanicalContraction(Stepper):
 
     def step(self, context: StepContext) -> Step:
         (bodies,) = context.effects.of(HardBodies)
-        overlaps = SumOverlaps(context, bodies)
+        overlaps, space = SumOverlaps(context, bodies), PackingSpace(context)
         shared = overlaps.exported()
         # Lists may have been lengthened since the last step, and are then empty.
         items = [*context.update_lists, BeginAttempt(context), *sum_phases(overlaps, shared)]
-        items.append(ChooseAction(context, bodies))
+        items.append(ChooseAction(context, bodies, space))
         buffers = [Buffer(shared, "overlaps between chunks", self.kind())]
         if self.method == "original":
             rates = RemovalRates(context, bodies)
             memory = rates.exported()
             items += [ScaleTwist(context, bodies), *sum_phases(rates, memory)]
             buffers.append(Buffer(memory, "removal rates between chunks", self.kind()))
-        motion = (BeginStep(context), MoveBodies(context, bodies), Advance(context))
+        motion = (BeginStep(context), MoveBodies(context, bodies, space), Advance(context))
         return Step((*items, *motion), tuple(buffers))
 
 
@@ -163,16 +168,15 @@ class ChooseAction(Phase):
     """This phase chooses whether to remove overlaps, to contract the world, or to return to the last
     configuration without overlaps."""
 
-    def __init__(self, context: StepContext, bodies: Any) -> None:
+    def __init__(self, context: StepContext, bodies: Any, space: PackingSpace) -> None:
         self.s, self.stepper, self.bodies = context.s, context.stepper, bodies
-        self.domain, self.control = context.domain, context.control
+        self.space, self.control = space, context.control
 
     @ti.func
     def run(self, w, _k):
         s = self.s
         if s.steps[w] == 0:
-            size, side = self.bodies.size(s, w, 0) * self.bodies.unit(w, 0), self.domain.side(w)
-            s.box_volume[w] = ti.cast(side[0] / size * (side[1] / size) * (side[2] / size), ti.f64)
+            s.box_volume[w] = self.space.volume(w, self.bodies.size(s, w, 0) * self.bodies.unit(w, 0))
             s.volume_decrease[w] = ti.cast(self.stepper.volume_step(w), ti.f64)
         last = s.end[w] - s.time[w] <= ti.cast(1.5, ti.f64) * ti.cast(self.control.dt(w), ti.f64)
         volume, ends = s.box_volume[w], False
@@ -199,7 +203,7 @@ class ChooseAction(Phase):
             s.box_volume[w] = volume
             if not ends and not (last and s.packing_action[w] == CONTRACT):
                 s.box_volume[w] = volume - s.volume_decrease[w]
-                s.growth[w] = elementary.pow(volume / s.box_volume[w], 1.0 / 3.0)
+                s.growth[w] = self.space.growth(volume, s.box_volume[w])
         if ends:
             s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
 
@@ -222,9 +226,10 @@ class MoveBodies(PerParticle):
     """This phase moves and turns each body, or puts it back to the last configuration without overlaps, and
     lets it grow."""
 
-    def __init__(self, context: StepContext, bodies: Any) -> None:
+    def __init__(self, context: StepContext, bodies: Any, space: PackingSpace) -> None:
         super().__init__(context.s)
         self.stepper, self.bodies, self.domain = context.stepper, bodies, context.domain
+        self.space = space
 
     @ti.func
     def run(self, w, i):
@@ -247,7 +252,9 @@ class MoveBodies(PerParticle):
             s.radius[w, i] = s.accepted_radius[w, i]
             # Lists are rebuilt, whatever has changed since.
             far = 2.0 * radius
-        s.radius[w, i] = s.radius[w, i] * ti.cast(s.growth[w], s.real)
+        growth = ti.cast(s.growth[w], s.real)
+        s.radius[w, i] = s.radius[w, i] * growth
+        place = self.space.grown(w, place, growth)
         grown = ti.cast(s.radius[w, i] - radius, ti.f64) + ti.cast(far, ti.f64)
         path = self.domain.nearest(w, before, place, end)
         apply_displacement(s, self.domain, w, i, place, ti.cast(path, ti.f64), grown, end)

@@ -3,6 +3,7 @@
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
+from tisim.effects.base import Confinement
 from tisim.numerics.vectors import piece
 from tisim.pairs.listed_pairs import ExportedTerms
 from tisim.pairs.pair_sum import ListedLaws, PairSum
@@ -20,10 +21,15 @@ REMOVAL_RATE = Field("removal_rate", "1/s", 1, "keep", scratch=True)
 """Largest speed at which the motion of a body removes an overlap, over the overlap."""
 
 
-class BodySum(PairSum):
-    """Base of the sums over the overlaps of bodies.
+DEEPEST_VIRTUAL = 0.5
+"""Depth behind a wall (D) up to which virtual bodies are placed."""
 
-    tolerance : overlaps (in D) up to this one do not count.
+
+class BodySum(PairSum):
+    """Base of the sums over the overlaps of bodies, with each other and with the walls of a confinement.
+
+    A subclass defines ``wall_term``, the term of a body that overlaps a wall, and ``finish_body`` in place of
+    ``finish``. The stepper has a parameter ``tolerance``: overlaps (in D) up to this one do not count.
     """
 
     commits: ClassVar[bool] = False
@@ -32,6 +38,7 @@ class BodySum(PairSum):
         assert context.neighbour_lists is not None
         super().__init__(context.s, context.domain, (bodies,), context.neighbour_lists.pairs)
         self.bodies, self.stepper = bodies, context.stepper
+        self.confinements = context.effects.of(Confinement)
 
     def exported(self) -> ExportedTerms:
         """Return the memory of the terms between chunks."""
@@ -48,6 +55,42 @@ class BodySum(PairSum):
         size_j = self.bodies.size(s, w, j) * self.bodies.unit(w, 0)
         counts = -gap > self.stepper.tolerance(w) * ti.min(size_i, size_j)
         return -gap, counts, normal, here / size_i, there / size_j
+
+    @ti.func
+    def wall_overlap(self, confinement: ti.template(), w, i, wall, end):  # type: ignore[valid-type]
+        """Return the overlap (m) of an end of a body with a wall, whether it counts, the normal from the body
+        to the wall or to the virtual body, and the point of contact in units of D."""
+        s, middle = self.s, self.bodies.end_centre(self.s, w, i, end)
+        size = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
+        place = s.position[w, i] - self.domain.origin(w) + middle
+        gap, outward = confinement.container.wall(w, wall, place, self.domain.side(w), size)
+        here = self.bodies.support(s, w, i, end, outward)
+        depth, normal = (here - middle).dot(outward) - gap, outward
+        if ti.static(confinement.treatment == "virtual"):
+            if depth > 0.0 and depth < DEEPEST_VIRTUAL * size:
+                point, along = here - depth * outward, confinement.container.along(w, wall, outward)
+                gap, normal, here, _there = self.bodies.closest_virtual(s, w, i, point, outward, along)
+                depth = -gap
+        return depth, depth > self.stepper.tolerance(w) * size, normal, here / size
+
+    @ti.func
+    def wall_term(self, w, i, depth, counts, normal, here):
+        """Return the contribution of an overlap of body i with a wall to its sum, given the results of
+        ``wall_overlap``."""
+        return ti.Vector.zero(self.s.real, self.components)
+
+    @ti.func
+    def finish(self, w, i, total, t):
+        for confinement in ti.static(self.confinements):
+            ends = self.bodies.end_count(self.s, w, i)
+            for k in range(ti.static(confinement.data.container.walls()) * ends):
+                depth, counts, normal, here = self.wall_overlap(confinement, w, i, k // ends, k % ends)
+                total = self.combine(total, self.wall_term(w, i, depth, counts, normal, here))
+        self.finish_body(w, i, total)
+
+    @ti.func
+    def finish_body(self, w, i, total):
+        """Use the finished sum of i over bodies and walls."""
 
 
 class SumOverlaps(BodySum):
@@ -69,6 +112,13 @@ class SumOverlaps(BodySum):
             values[k], values[3 + k], values[6 + k] = push[k], turn_i[k], turn_j[k]
         values[9] = ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
         return values
+
+    @ti.func
+    def wall_term(self, w, i, depth, counts, normal, here):
+        size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
+        push = -ti.select(counts, self.stepper.weight(depth / size), 0.0) * normal
+        turn, over = here.cross(push), ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
+        return ti.Vector([push[0], push[1], push[2], turn[0], turn[1], turn[2], over])
 
     @ti.func
     def pair_contributions(self, values):
@@ -98,7 +148,7 @@ class SumOverlaps(BodySum):
         return ti.Vector([push[0], push[1], push[2], twist[0], twist[1], twist[2], s.inverse_overlap[w, i]])
 
     @ti.func
-    def finish(self, w, i, total, t):
+    def finish_body(self, w, i, total):
         self.write_sum(w, i, total)
         if total[6] > 0.0:
             ti.atomic_add(self.s.overlapping[w], ti.i64(1))
@@ -123,6 +173,13 @@ class RemovalRates(BodySum):
         return ti.Vector([ti.max(speed_i, 0.0) * over, ti.max(speed_j, 0.0) * over])
 
     @ti.func
+    def wall_term(self, w, i, depth, counts, normal, here):
+        s = self.s
+        speed = -(s.overlap_push[w, i] + s.overlap_twist[w, i].cross(here)).dot(normal)
+        over = ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
+        return ti.Vector([ti.max(speed, 0.0) * over])
+
+    @ti.func
     def pair_contributions(self, values):
         return ti.Vector([values[0]]), ti.Vector([values[1]])
 
@@ -139,5 +196,5 @@ class RemovalRates(BodySum):
         return ti.Vector([self.s.removal_rate[w, i]])
 
     @ti.func
-    def finish(self, w, i, total, t):
+    def finish_body(self, w, i, total):
         self.write_sum(w, i, total)
