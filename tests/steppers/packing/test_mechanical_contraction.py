@@ -223,9 +223,14 @@ def test_other_effects_and_domains_are_refused():
         Scene(**{**parts, "stepper": Verlet(control=FixedStep(dt=1.0))})
 
 
-def test_a_box_must_be_wide_enough_at_the_highest_density():
-    with pytest.raises(InputError, match=r"box must be at least 5 m wide at a packing fraction of 0.75"):
-        run(scene(ROD, 40))
+def test_a_box_must_be_wide_enough_for_its_bodies():
+    """At the start, and while they grow."""
+    with pytest.raises(InputError, match="box must be at least 10 m wide where it is periodic"):
+        run(scene(SpherocylinderShape(length=4.0, diameter=1.0), 9))
+    made = scene(ROD, 30, duration=1e5, method="original", volume_step=2.0)
+    result = run(made)
+    assert "bodies longer than half the periodic box; take more bodies" in result.status.reason
+    assert 4 * result.state["radius"][0] == pytest.approx(made.domain.high[0], rel=1e-2)
 
 
 def test_quaternions_and_shapes_of_a_start_are_checked():

@@ -27,7 +27,7 @@ from tisim.steppers.packing.overlaps import (
     RemovalRates,
     SumOverlaps,
 )
-from tisim.steppers.packing.space import PackingSpace
+from tisim.steppers.packing.space import CheckWidth, PackingSpace
 from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 from tisim.steppers.verlet import Advance
 
@@ -149,7 +149,8 @@ class MechanicalContraction(Stepper):
             memory = rates.exported()
             items += [ScaleTwist(context, bodies), *sum_phases(rates, memory)]
             buffers.append(Buffer(memory, "removal rates between chunks", self.kind()))
-        motion = (BeginStep(context), MoveBodies(context, bodies, space), Advance(context))
+        moved = MoveBodies(context, bodies, space), CheckWidth(context)
+        motion = (BeginStep(context), *moved, Advance(context))
         return Step((*items, *motion), tuple(buffers))
 
 
