@@ -26,8 +26,8 @@ def directions(histograms: Mapping[str, DirectionHistogram]) -> Figure:
         mesh = axis.pcolormesh(
             np.degrees(one.azimuth), one.cosine, one.density, vmin=0, vmax=largest, cmap="viridis"
         )
-        ends = np.degrees(one.azimuth[[0, -1]])
-        axis.set_xticks(np.linspace(*ends, 4 if ends[0] == 0 else 5))
+        first, last = np.degrees(one.azimuth[[0, -1]])
+        axis.set_xticks(np.linspace(first, last, 4 if first == 0 else 5))
         axis.set(xlabel="azimuth (degrees)", title=title)
     panels[0].set_ylabel("cosine of the polar angle")
     figure.colorbar(mesh, ax=panels.tolist(), label="density of directions (1: random)")

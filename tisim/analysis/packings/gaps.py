@@ -85,23 +85,15 @@ def _closest(
         return out
     first, second = i.astype(np.int32), j.astype(np.int32)
     where = (np.ascontiguousarray(separation), first, second, np.ascontiguousarray(packing.orientation))
+    runtime.current()
     if None not in rods:
         sizes = np.array([one for one in rods if one], float).reshape(-1, 2)
-        _launch(_rods, *where, sizes[packing.shape] * packing.scale[:, None], out)
+        _rods(*where, sizes[packing.shape] * packing.scale[:, None], out)
         return out
     axes, exponents = (np.array([one[k] for one in superquadrics if one]) for k in (0, 1))
     sizes, powers = axes[packing.shape] * packing.scale[:, None], exponents[packing.shape]
-    _launch(_superquadrics, bool((exponents == 2).all()), *where, sizes, powers, float(reach), out)
+    _superquadrics(bool((exponents == 2).all()), *where, sizes, powers, float(reach), out)
     return out
-
-
-@in_taichi_thread
-def _launch(kernel, *arguments):  # type: ignore[no-untyped-def]
-    runtime.current()
-    kernel(*arguments)
-
-
-Array = ti.types.ndarray()
 
 
 @ti.func
@@ -117,28 +109,43 @@ def _write(out: ti.template(), m, gap, normal):  # type: ignore[valid-type]
         out[m, 1 + k] = normal[k]
 
 
+@in_taichi_thread
 @ti.kernel
-def _rods(separation: Array, i: Array, j: Array, q: Array, rod: Array, out: Array):  # type: ignore[valid-type]
-    for m in range(i.shape[0]):
-        a, b, c = i[m], j[m], _row(separation, m, 3)
+def _rods(
+    separation: ti.types.ndarray(),  # type: ignore[valid-type]
+    first: ti.types.ndarray(),  # type: ignore[valid-type]
+    second: ti.types.ndarray(),  # type: ignore[valid-type]
+    q: ti.types.ndarray(),  # type: ignore[valid-type]
+    rod: ti.types.ndarray(),  # type: ignore[valid-type]
+    out: ti.types.ndarray(),  # type: ignore[valid-type]
+):
+    for m in range(first.shape[0]):
+        i, j, c = first[m], second[m], _row(separation, m, 3)
         along = 0.0 * c
         along[2] += 1.0
-        half_a, radius_a = ti.cast(rod[a, 0], ti.f64), ti.cast(rod[a, 1], ti.f64)
-        half_b, radius_b = ti.cast(rod[b, 0], ti.f64), ti.cast(rod[b, 1], ti.f64)
-        axis_a, axis_b = rotated(_row(q, a, 4), along), rotated(_row(q, b, 4), along)
-        gap, normal, _x, _y = closest_rods(c, axis_a, half_a, radius_a, axis_b, half_b, radius_b)
+        axis_i, axis_j = rotated(_row(q, i, 4), along), rotated(_row(q, j, 4), along)
+        sizes_i, sizes_j = _row(rod, i, 2), _row(rod, j, 2)
+        gap, normal, _x, _y = closest_rods(c, axis_i, sizes_i[0], sizes_i[1], axis_j, sizes_j[0], sizes_j[1])
         _write(out, m, gap, normal)
 
 
+@in_taichi_thread
 @ti.kernel
 def _superquadrics(
-    ellipsoids: ti.template(), separation: Array, i: Array, j: Array, q: Array, axes: Array, exponents: Array,
-    far: ti.f64, out: Array,
-):  # fmt: skip  # type: ignore[valid-type]
-    for m in range(i.shape[0]):
-        a, b = i[m], j[m]
-        here = _row(q, a, 4), _row(axes, a, 3), _row(exponents, a, 3)
-        there = _row(q, b, 4), _row(axes, b, 3), _row(exponents, b, 3)
+    ellipsoids: ti.template(),  # type: ignore[valid-type]
+    separation: ti.types.ndarray(),  # type: ignore[valid-type]
+    first: ti.types.ndarray(),  # type: ignore[valid-type]
+    second: ti.types.ndarray(),  # type: ignore[valid-type]
+    q: ti.types.ndarray(),  # type: ignore[valid-type]
+    axes: ti.types.ndarray(),  # type: ignore[valid-type]
+    exponents: ti.types.ndarray(),  # type: ignore[valid-type]
+    far: ti.f64,
+    out: ti.types.ndarray(),  # type: ignore[valid-type]
+):
+    for m in range(first.shape[0]):
+        i, j = first[m], second[m]
+        here = _row(q, i, 4), _row(axes, i, 3), _row(exponents, i, 3)
+        there = _row(q, j, 4), _row(axes, j, 3), _row(exponents, j, 3)
         gap, normal, _x, _y = closest_superquadrics(
             ellipsoids, _row(separation, m, 3), here[0], here[1], here[2], there[0], there[1], there[2], far
         )

@@ -18,8 +18,8 @@ from tisim.numerics.statistics import CONFIDENCE
 
 POINTS = 200_000
 """Number of sampled points. A packing fraction of 0.6 then has an interval of +- 0.002."""
-TESTS_AT_ONCE = 2_000_000
-"""Pairs of a point and a bounding sphere that are tested at once, which take 200 MB."""
+TESTS_AT_ONCE = 500_000
+"""Pairs of a point and a bounding sphere that are tested at once, which take up to 200 MB."""
 
 
 class FractionProfile(NamedTuple):

@@ -26,9 +26,10 @@ def permeability(
         k = (1 - phi)^3 nu^2 / (C phi^2)
 
     phi is the packing fraction, in the box or in a container of ``volume`` (m^3), and nu the volume of the
-    bodies over their surface: D/6 for spheres. constant : C, which contains the tortuosity and the form of
-        the pores.
-    The law is an average over random packings of like bodies; it knows nothing of their order.
+    bodies over their surface: D/6 for spheres. The law is an average over random packings of like bodies; it
+    knows nothing of their order.
+
+    constant : C, which contains the tortuosity and the form of the pores.
 
     Source: B16 Eq. (7.4), after Kozeny (1927) and Carman (1937).
     """

@@ -10,7 +10,7 @@ from tisim.errors import must
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.superquadric import power_sum_root
 
-NODES = 160
+OCTANT_NODES = 160
 """Gauss-Legendre nodes of each angle within an octant. Up to an aspect ratio of 10 and an exponent of 20 the
 relative errors are then below 1e-7 (the largest that was found), and below 1e-12 for exponents up to 8."""
 
@@ -70,7 +70,7 @@ def _superquadric(shape: ParticleShape) -> tuple[np.ndarray, np.ndarray]:
 
 def _octant() -> tuple[np.ndarray, np.ndarray]:
     """Return directions in the first octant and their weights, which are solid angles."""
-    x, w = leggauss(NODES)
+    x, w = leggauss(OCTANT_NODES)
     # The angles are even functions of u at both ends, where powers of components are not smooth.
     u = np.pi / 4 * (x + 1)
     theta, wide = np.pi / 2 * np.sin(u) ** 2, np.pi / 4 * np.pi / 2 * np.sin(2 * u) * w

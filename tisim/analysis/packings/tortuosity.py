@@ -16,7 +16,7 @@ RESIDUAL = 1e-8
 """Residual of the concentrations at which their iteration ends, relative to the first one."""
 MOST_ITERATIONS = 20_000
 """Largest number of iterations; a cube of 100 voxels a side takes about 300."""
-EDGE = 2.0
+HALF_VOXEL = 2.0
 """Conductance of the half voxel between a face of the image and the centre of the first voxel, relative to a
 whole voxel."""
 
@@ -74,10 +74,10 @@ def pore_diffusion(image: np.ndarray, axis: int = 2, periodic: Axes = ALL_AXES) 
         concentration = _solution(_laplacian(links, count), source)
         flux = (1 + concentration[low] - concentration[high]).sum() / pores.size
     else:
-        ends = EDGE * (np.bincount(first, minlength=count) + np.bincount(last, minlength=count))
-        source = EDGE * np.bincount(first, minlength=count).astype(float)
+        ends = HALF_VOXEL * (np.bincount(first, minlength=count) + np.bincount(last, minlength=count))
+        source = HALF_VOXEL * np.bincount(first, minlength=count).astype(float)
         concentration = _solution(_laplacian(links, count) + diags_array(ends), source)
-        through = EDGE * (1 - concentration[first]).sum()
+        through = HALF_VOXEL * (1 - concentration[first]).sum()
         flux = through * pores.shape[axis] / (pores.size / pores.shape[axis])
     # What is left of fluxes that cancel in closed pores is rounding.
     relative = float(flux) if flux > 100 * RESIDUAL * porosity else 0.0
