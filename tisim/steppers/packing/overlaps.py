@@ -116,7 +116,10 @@ class SumOverlaps(BodySum):
     @ti.func
     def wall_term(self, w, i, depth, counts, normal, here):
         size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
-        push = -ti.select(counts, self.stepper.weight(depth / size), 0.0) * normal
+        # Unlike another body, a wall may be deeper than D; the weight of the original method would change its
+        # sign there.
+        weight = self.stepper.weight(ti.min(depth / size, DEEPEST_VIRTUAL))
+        push = -ti.select(counts, weight, 0.0) * normal
         turn, over = here.cross(push), ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
         return ti.Vector([push[0], push[1], push[2], turn[0], turn[1], turn[2], over])
 
