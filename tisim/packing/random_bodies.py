@@ -15,7 +15,7 @@ from tisim.shapes.particle_shape import ParticleShape
 
 TRIED_TOGETHER = 100_000
 """Places that are tried at once."""
-MOST_TRIED = 20_000_000
+MOST_TRIED = 200_000_000
 """Largest number of places that are tried for a start."""
 ROUNDING = 1e-12
 """Bodies may cross a wall by this part of D, which is lost to rounding."""
