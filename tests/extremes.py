@@ -24,6 +24,7 @@ from tisim.components import serialization
 from tisim.describe.explain import known_effects
 from tisim.effects import (
     Agglomeration,
+    Confinement,
     DerivedQuantity,
     Effect,
     Granular,
@@ -175,8 +176,8 @@ EACH = {"group": [1, 0, 0]} | {
 FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 
 
-PACKED = (HardRods,)
-"""Hard bodies, which need a packing stepper and more bodies; see tests/steppers/packing."""
+PACKED = (Confinement, HardRods)
+"""Hard bodies and their walls, which need a packing stepper and more bodies; see tests/steppers/packing."""
 
 
 @cache

@@ -51,11 +51,12 @@ def test_shapes_without_round_ends_are_refused_in_curved_containers(shape):
 
 @pytest.mark.parametrize("container", [CYLINDER, WEDGE, SPHERICAL], ids=lambda one: one.kind())
 def test_bodies_are_uniform_over_all_places_at_which_they_cross_no_wall(container, rng):
-    """Beside bodies that are drawn in the whole box, of which those inside are kept."""
-    start = random_bodies(ROD, 3000, 0.1, container, 7)
+    """Beside bodies that are drawn in the whole box, of which those inside are kept. At this packing fraction
+    few places are taken."""
+    start = random_bodies(ROD, 3000, 0.005, container, 7)
     side = np.array(start.box.high)
     volume = container.volume_in(side, ROD.diameter)
-    assert 3000 * ROD.volume() / volume == pytest.approx(0.1, rel=1e-12)
+    assert 3000 * ROD.volume() / volume == pytest.approx(0.005, rel=1e-12)
     assert start.box.periodic == tuple(not hard for hard in container.walled())
     gaps = wall_gaps(ROD, start.position, start.orientation, container, side)
     assert 0 <= gaps.min() < 1e-5
@@ -80,6 +81,29 @@ def test_a_periodic_start_is_uniform_in_its_cube():
     assert np.abs((axes**2).mean(axis=0) - 1 / 3).max() < 5 * np.sqrt(4 / 45 / 2000)
 
 
+@pytest.mark.parametrize("container", [None, CYLINDER], ids=["periodic", "cylinder"])
+@pytest.mark.parametrize("shape", [ROD, SPHERE], ids=lambda one: one.kind())
+def test_bodies_of_a_start_do_not_overlap(shape, container):
+    """Against the least distance of points on both segments, in B16's sense; some are nearly in touch."""
+    start, (half, radius) = random_bodies(shape, 200, 0.15, container, 5), shape.rod()
+    axes = Rotation.from_quat(start.orientation, scalar_first=True).apply([0.0, 0.0, 1.0])
+    ends, side = np.linspace(-half, half, 41), np.array(start.box.high)
+    least = []
+    for i in range(200):
+        apart = start.position[:i] - start.position[i]
+        apart -= np.where(start.box.periodic, side * np.round(apart / side), 0)
+        for j in np.flatnonzero(np.linalg.norm(apart, axis=1) < 2.6 * (half + radius)):
+            a, b = ends[:, None, None] * axes[i], apart[j] + ends[None, :, None] * axes[j]
+            least.append(np.linalg.norm(b - a, axis=2).min() - 2 * radius)
+    assert -1e-12 < min(least) < 0.3 * radius
+
+
+def test_bodies_without_round_ends_are_kept_apart_by_their_bounding_spheres():
+    start, reach = random_bodies(SUPERQUADRIC, 100, 0.02, CUBE), 2 * SUPERQUADRIC.bounding_radius()
+    apart = np.linalg.norm(start.position[:, None] - start.position[None], axis=2)
+    assert apart[~np.eye(100, dtype=bool)].min() >= reach
+
+
 def test_a_start_depends_on_its_seed_alone():
     one, same, other = (random_bodies(ROD, 50, 0.1, CYLINDER, seed) for seed in (1, 1, 2))
     assert (one.position == same.position).all()
@@ -101,7 +125,10 @@ def test_wrong_starts_are_refused(monkeypatch):
     for given, message in (
         ((ROD, 0, 0.1), "number must be a whole number, at least 1"),
         ((ROD, 10, 1.0), "fraction must be between 0 and 1"),
-        ((SpherocylinderShape(length=0.1, diameter=1e-3), 10, 0.1, narrow), "container must be wide enough"),
+        (
+            (SpherocylinderShape(length=0.1, diameter=1e-3), 10, 0.1, narrow),
+            "fraction must be one at which 10 bodies find places",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             random_bodies(*given)

@@ -207,7 +207,9 @@ def test_a_container_grows_with_its_bodies(container):
             volumes = [container.volume_in(side, 2 * one["radius"][0]) for one in (before, after)]
             ratio = volumes[1] / volumes[0] / growth**3
             assert ratio == pytest.approx(growth**-contracted, rel=1e-12)
-            in_units = [v / (2 * one["radius"][0]) ** 3 for v, one in zip(volumes, (before, after), strict=True)]
+            in_units = [
+                v / (2 * one["radius"][0]) ** 3 for v, one in zip(volumes, (before, after), strict=True)
+            ]
             assert in_units[0] - in_units[1] == pytest.approx(2.0, rel=1e-9)
             moved = side / 2 + np.where(scaled, growth, 1.0) * (before["position"] - side / 2)
             np.testing.assert_allclose(after["position"], moved, rtol=0, atol=1e-12)
@@ -325,7 +327,10 @@ def test_what_does_not_fit_is_refused():
     inside = [bodies, Confinement(container=SphericalContainer())]
     periodic, closed = Box(low=(0, 0, 0), high=high), Box(low=(0, 0, 0), high=high, periodic=(False,) * 3)
     for change, message in (
-        ({"domain": periodic}, "domain must be a box that is periodic along z alone for cylindrical_container"),
+        (
+            {"domain": periodic},
+            "domain must be a box that is periodic along z alone for cylindrical_container",
+        ),
         ({"domain": closed, "effects": inside}, "domain must be a cube around a spherical_container"),
         (
             {"effects": [bodies, around, around.model_copy(update={"name": "other"})]},
@@ -337,7 +342,7 @@ def test_what_does_not_fit_is_refused():
         with pytest.raises(InputError, match=message):
             Scene(**{**parts, **change})
     longer = made.start() | {"radius": np.linspace(1.0, 1.1, 80)}
-    with pytest.raises(InputError, match="particles.radius must be in one ratio to their shapes"):
+    with pytest.raises(InputError, match=r"particles.radius must be in one ratio to their shapes"):
         bodies.check_start(longer, made)
 
 

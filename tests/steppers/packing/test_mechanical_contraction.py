@@ -183,7 +183,10 @@ def test_other_effects_and_domains_are_refused():
     flat = Box(low=(0, 0, 0), high=made.domain.high, periodic=(True, True, False))
     for change, message in (
         ({"effects": [*made.effects, Gravity()]}, "effects.gravity must be hard bodies alone"),
-        ({"domain": flat}, "domain must be a periodic box for mechanical_contraction, or one with an effect confinement"),
+        (
+            {"domain": flat},
+            "domain must be a periodic box for mechanical_contraction, or one with an effect confinement",
+        ),
         ({"effects": [Gravity()]}, "effects must be one with hard bodies for mechanical_contraction"),
     ):
         with pytest.raises(InputError, match=message):

@@ -66,7 +66,7 @@ class BodySum(PairSum):
         gap, outward = confinement.container.wall(w, wall, place, self.domain.side(w), size)
         here = self.bodies.support(s, w, i, end, outward)
         depth, normal = (here - middle).dot(outward) - gap, outward
-        if ti.static(confinement.treatment == "virtual"):
+        if ti.static(confinement.treatment == "virtual"):  # noqa: SIM102
             if depth > 0.0 and depth < DEEPEST_VIRTUAL * size:
                 point, along = here - depth * outward, confinement.container.along(w, wall, outward)
                 gap, normal, here, _there = self.bodies.closest_virtual(s, w, i, point, outward, along)
