@@ -24,6 +24,7 @@ from tisim.components import serialization
 from tisim.describe.explain import known_effects
 from tisim.effects import (
     Agglomeration,
+    Confinement,
     DerivedQuantity,
     Effect,
     Granular,
@@ -178,7 +179,7 @@ FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 
 def for_packings(kind: type) -> bool:
     """Whether a part belongs to packings, whose scenes have many bodies; tests/steppers/packing has them."""
-    return issubclass(kind, HardBodies | Attempts) or getattr(kind, "packs", False)
+    return issubclass(kind, HardBodies | Confinement | Attempts) or getattr(kind, "packs", False)
 
 
 @cache

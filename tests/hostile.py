@@ -14,7 +14,7 @@ from tisim import Blast, Cloud, Material, RandomAroundCylinder, RandomInBox, ste
 from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.describe.explain import known_effects
-from tisim.effects import Effect, HardBodies, HardRods
+from tisim.effects import Confinement, Effect, HardBodies, HardRods
 from tisim.sources import MagneticField
 from tisim.steppers import DriftLimit, FixedStep, Stepper
 
@@ -143,7 +143,7 @@ def valid() -> tuple[dict[str, Any], ...]:
                 "effects": with_needed(kind),
             }
             for kind in known_effects()
-            if not issubclass(kind, HardBodies)
+            if not issubclass(kind, Confinement | HardBodies)
         ),
     )
 

@@ -66,9 +66,7 @@ def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[
     return [measured(result) for result in sound(run(list(scenes), progress))]
 
 
-def grouped(
-    scenes: Sequence[Sequence[Scene]], progress: Progress | None = None
-) -> list[list[Packing]]:
+def grouped(scenes: Sequence[Sequence[Scene]], progress: Progress | None = None) -> list[list[Packing]]:
     """Return the packings of groups of scenes, packed as one batch."""
     found = iter(packings([one for group in scenes for one in group], progress))
     return [[next(found) for _ in group] for group in scenes]

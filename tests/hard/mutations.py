@@ -77,7 +77,8 @@ CONTACT = "tisim/effects/contact"
 LAWS = "tests/effects/contact/test_contact.py::test_contact_equals_its_numpy_reference"
 SOFT_GRAINS = {
     "hard_rods": (
-        f"{CONTACT}/hard_rods.py", "0.5 * a * self.rods.diameter", "0.4 * a * self.rods.diameter",
+        f"{CONTACT}/hard_rods.py", "0.5 * self.size(s, w, i) * self.rods.diameter",
+        "0.4 * self.size(s, w, i) * self.rods.diameter",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[revised]",
     ),
     "hard_ellipsoids": (
@@ -89,6 +90,11 @@ SOFT_GRAINS = {
         f"{CONTACT}/hard_superquadrics.py", "return self.superquadrics.exponents(w, k)",
         "return 2.0 + 0.0 * self.superquadrics.exponents(w, k)",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[cuboids]",
+    ),
+    "confinement": (
+        "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
+        "tests/steppers/packing/test_confinement.py::"
+        "test_an_attempt_equals_its_reference[exact-cylindrical_container]",
     ),
     "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{LAWS}[contact]"),
     "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{LAWS}[hertz]"),

@@ -22,6 +22,7 @@ from tisim.effects.base import Effect
 from tisim.effects.contact.granular.parts import ContactPart
 from tisim.effects.walls.motion import Motion
 from tisim.errors import InputError, abbreviated, did_you_mean
+from tisim.geometry.container import Container
 from tisim.geometry.shape import Shape
 from tisim.materials.materials import ContactProperties
 from tisim.operators.base import Operator
@@ -68,6 +69,7 @@ FAMILIES = {
     "bodies": Family("Bodies of magnetic sources", Body, ""),
     "shapes": Family("Shapes of walls", Shape, ""),
     "particle_shapes": Family("Shapes of particles", ParticleShape, ""),
+    "containers": Family("Containers of hard bodies", Container, "effects.confinement.container"),
     "motions": Family("Motions of walls and groups", Motion, "effects.walls.motion"),
     "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
     "materials": Family("Materials", ContactProperties, ""),

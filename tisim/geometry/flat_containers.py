@@ -81,7 +81,7 @@ class WedgeContainer(Container):
         x, y = places[:, 0], places[:, 1]
         outward = np.array([[0.0, -1.0, 0.0], [-s, c, 0.0], [1.0, 0.0, 0.0]])
         distance = np.column_stack([y, s * x - c * y, self.length * unit - x])
-        return distance, np.broadcast_to(outward, (len(places), 3, 3))
+        return distance, np.tile(outward, (len(places), 1, 1))
 
     def points(self, numbers: np.ndarray, side: np.ndarray, unit: float, margin: float) -> np.ndarray:
         # The points away from the walls form a smaller wedge, with its apex on the bisector.
@@ -173,7 +173,7 @@ class BoxContainer(Container):
         axes, half = np.repeat(np.flatnonzero(self.hard), 2), self.widths(side, unit) / 2
         sign = np.tile([-1.0, 1.0], len(axes) // 2)
         distance = half[axes] - sign * (places - side / 2)[:, axes]
-        return distance, np.broadcast_to(sign[:, None] * np.eye(3)[axes], (len(places), len(axes), 3))
+        return distance, np.tile(sign[:, None] * np.eye(3)[axes], (len(places), 1, 1))
 
     def points(self, numbers: np.ndarray, side: np.ndarray, unit: float, margin: float) -> np.ndarray:
         wide = self.widths(side, unit) - 2 * margin * np.array(self.hard)

@@ -15,8 +15,10 @@ from tisim.shapes.particle_shape import ParticleShape
 
 TRIED_TOGETHER = 100_000
 """Places that are tried at once."""
-MOST_TRIED = 20_000_000
+MOST_TRIED = 200_000_000
 """Largest number of places that are tried for a start."""
+PARALLEL = 1e-12
+"""Squared sine of the angle below which rods count as parallel."""
 ROUNDING = 1e-12
 """Bodies may cross a wall by this part of D, which is lost to rounding."""
 
@@ -49,44 +51,95 @@ class RandomBodies:
 def random_bodies(
     shape: ParticleShape, number: int, fraction: float, container: Container | None = None, seed: int = 0
 ) -> RandomBodies:
-    """Return bodies at random places in random directions, in a periodic cube or inside a container.
+    """Return bodies at random places in random directions without overlaps, in a periodic cube or inside a
+    container.
 
-    number : of bodies. fraction : packing fraction of the start, which defines the size of the box. container
-    : with bodies completely inside its walls; None for a periodic cube. seed : of the random numbers.
+    number : of bodies. fraction : packing fraction of the start, which defines the size of the box; B16 takes
+    0.05, and 0.005 for long rods. container : with bodies completely inside its walls; None for a periodic
+    cube. seed : of the random numbers.
 
-    Positions and orientations are uniformly distributed over all those at which a body does not cross a wall:
-    each body is drawn until it does not. Bodies may overlap each other; packing steppers remove these
-    overlaps first. InputError is raised if a container is so narrow that no such places are found.
+    The bodies are placed one after another. Each is drawn uniformly from all positions and orientations until
+    it crosses no wall and overlaps no other body. Bodies that are neither rods nor spheres are kept apart by
+    their bounding spheres. InputError is raised if no further place is found.
 
-    Source: B16 section 2.2.4.
+    Source: B16 sections 2.2.1 and 2.2.4.
     """
     must(is_whole(number, 1), "number", "a whole number, at least 1", number)
     must(0 < fraction < 1, "fraction", "between 0 and 1", fraction)
     volume, unit = number * shape.volume() / fraction, diameter(shape)
     side = np.full(3, np.cbrt(volume)) if container is None else container.box_of(volume, unit)
+    periodic = _periodic(container)
+    images = np.where(periodic, side, 0.0)
     generator = np.random.default_rng([seed, 0xB0D135])
-    position, orientation = np.empty((0, 3)), np.empty((0, 4))
-    tried = 0
-    while len(position) < number:
-        some = number if container is None else TRIED_TOGETHER
+    position, orientation = np.empty((number, 3)), np.empty((number, 4))
+    placed = tried = 0
+    while placed < number:
+        if tried >= MOST_TRIED:
+            rule = f"one at which {number} bodies find places in {MOST_TRIED:.0e} trials in this container"
+            raise InputError(f"fraction must be {rule}; received {fraction:g}, with {placed} of them placed")
+        some = TRIED_TOGETHER if placed or container is not None else number
         numbers = generator.uniform(size=(some, 3))
-        places = side * numbers
-        turns = Rotation.random(some, rng=generator).as_quat(scalar_first=True)
+        places, turns = side * numbers, Rotation.random(some, rng=generator).as_quat(scalar_first=True)
         if container is not None:
             places = container.points(numbers, side, unit, unit / 2)
-            gaps = wall_gaps(shape, places, turns, container, side).min(axis=1)
-            inside = gaps >= -ROUNDING * unit
+            inside = wall_gaps(shape, places, turns, container, side).min(axis=1) >= -ROUNDING * unit
             places, turns = places[inside], turns[inside]
-        position, orientation = np.vstack([position, places]), np.vstack([orientation, turns])
+        # The lower face of a periodic box belongs to it, the upper one does not.
+        places = np.minimum(places, np.nextafter(side, 0.0))
         tried += some
-        if tried >= MOST_TRIED and len(position) < number:
-            rule = f"wide enough for {number} bodies in {MOST_TRIED:.0e} trials at random"
-            raise InputError(f"container must be {rule}; received one with {len(position)} of them")
+        for place, turn in zip(places, turns, strict=True):
+            others = position[:placed], orientation[:placed]
+            if placed < number and _is_free(shape, place, turn, *others, side, images):
+                position[placed], orientation[placed] = place, turn
+                placed += 1
     high = (float(side[0]), float(side[1]), float(side[2]))
-    box = Box(low=(0.0, 0.0, 0.0), high=high, periodic=_periodic(container))
-    # The lower face of a periodic box belongs to it, the upper one does not.
-    inside_box = np.minimum(position[:number], np.nextafter(side, 0.0))
-    return RandomBodies(inside_box, orientation[:number], shape.bounding_radius(), shape.volume(), box)
+    box = Box(low=(0.0, 0.0, 0.0), high=high, periodic=periodic)
+    return RandomBodies(position, orientation, shape.bounding_radius(), shape.volume(), box)
+
+
+def _is_free(
+    shape: ParticleShape,
+    place: np.ndarray,
+    turn: np.ndarray,
+    others: np.ndarray,
+    turns: np.ndarray,
+    side: np.ndarray,
+    images: np.ndarray,
+) -> bool:
+    """Return whether a body overlaps none of the others. images : distances of images (m), 0 along axes that
+    are not periodic."""
+    apart = others - place
+    apart -= images * np.rint(apart / side)
+    near = np.einsum("ij,ij->i", apart, apart) < (2 * shape.bounding_radius()) ** 2
+    rod = shape.rod()
+    if rod is None or not near.any():
+        return not near.any()
+    half, radius = rod
+    z = np.array([0.0, 0.0, 1.0])
+    axis = Rotation.from_quat(turn, scalar_first=True).apply(z)
+    axes = Rotation.from_quat(turns[near], scalar_first=True).apply(z)
+    return bool((segment_distances(apart[near], axis, axes, half) >= 2 * radius).all())
+
+
+def segment_distances(apart: np.ndarray, axis: np.ndarray, axes: np.ndarray, half: float) -> np.ndarray:
+    """Return the distances (m) of segments from a segment of the same length, shape (n,).
+
+    apart : their centres minus its centre (m, shape (n, 3)). axis, axes : unit vectors along it, shape (3,),
+    and along them, shape (n, 3). half : half the length (m).
+
+    Source: C. Vega and S. Lago, Computers & Chemistry 18 (1994) 55.
+    """
+    b, along, other = axes @ axis, apart @ axis, np.einsum("ij,ij->i", apart, axes)
+    square = 1 - b * b
+    apart_ways = square > PARALLEL
+    beside = 0.5 * (np.maximum(-half, along - half) + np.minimum(half, along + half))
+    line = (along - b * other) / np.where(apart_ways, square, 1.0)
+    on_it = np.clip(np.where(apart_ways, line, beside), -half, half)
+    on_them = np.clip(b * on_it - other, -half, half)
+    on_it = np.clip(along + b * on_them, -half, half)
+    between = apart + on_them[:, None] * axes - on_it[:, None] * axis
+    distances: np.ndarray = np.linalg.norm(between, axis=1)
+    return distances
 
 
 def diameter(shape: ParticleShape) -> float:

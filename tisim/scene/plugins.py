@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
-from tisim import components, effects, operators, packing, scene, sources, steppers
+from tisim import components, effects, geometry, operators, packing, scene, sources, steppers
 from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.errors import InputError, Words, must, printable
@@ -58,7 +58,7 @@ def installed() -> dict[str, str]:
 
 @cache
 def _load_own() -> None:
-    for package in (components, effects, operators, packing, scene, sources, steppers):
+    for package in (components, effects, geometry, operators, packing, scene, sources, steppers):
         serialization.load(package)
 
 

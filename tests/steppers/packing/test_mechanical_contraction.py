@@ -72,26 +72,39 @@ def contact(shape, separation, turn_i, turn_j, size=1.0):
     return 2 * radius - distance, normal, a * axis_i + radius * normal, b * axis_j - radius * normal
 
 
-def attempt(state, side, shape, method, dt=0.1, beta=0.5, tolerance=1e-4):
-    """Positions and orientations after one attempt to remove the overlaps; B16 (2.7)-(2.10), (3.6)-(3.13)."""
+def attempt(
+    state, side, shape, method, dt=0.1, beta=0.5, tolerance=1e-4, periodic=(True, True, True), walls=None
+):
+    """Positions and orientations after one attempt to remove the overlaps; B16 (2.7)-(2.10), (3.6)-(3.13).
+
+    walls : function of the place and the axis of a rod that returns its overlaps with walls: depth, normal
+    along which it leaves the wall, and point of contact.
+    """
     x, turns = state["position"], Rotation.from_quat(state["orientation"], scalar_first=True)
     number, mass = len(x), shape.volume()
     touching = [[] for _ in range(number)]
     for i in range(number):
         for j in range(i):
             d = x[j] - x[i]
-            d -= side * np.round(d / side)
+            d -= np.where(periodic, side * np.round(d / side), 0)
             if np.linalg.norm(d) > 2 * shape.bounding_radius():
                 continue
             depth, normal, here, there = contact(shape, d, turns[i], turns[j])
             if depth > tolerance:
                 touching[i].append((depth, -normal, here))
                 touching[j].append((depth, normal, there))
+    others = [len(contacts) for contacts in touching]
+    if walls is not None:
+        axes = turns.apply([0.0, 0.0, 1.0])
+        for contacts, place, axis in zip(touching, x, axes, strict=True):
+            contacts += [found for found in walls(place, axis) if found[0] > tolerance]
     places, orientations = x.copy(), turns.as_matrix()
     for i, contacts in enumerate(touching):
         if not contacts:
             continue
-        weights = [depth * (1 - depth) if method == "original" else 1.0 for depth, _, _ in contacts]
+        # The weight of a wall that is deeper than D/2 is constant.
+        depths = [min(one[0], 0.5) if k >= others[i] else one[0] for k, one in enumerate(contacts)]
+        weights = [depth * (1 - depth) if method == "original" else 1.0 for depth in depths]
         push = sum(weight * n for weight, (_, n, _) in zip(weights, contacts, strict=True))
         twist = sum(weight * np.cross(r, n) for weight, (_, n, r) in zip(weights, contacts, strict=True))
         body = orientations[i]
@@ -106,7 +119,7 @@ def attempt(state, side, shape, method, dt=0.1, beta=0.5, tolerance=1e-4):
             rates = [((push + np.cross(spin, r)) @ n) / depth for depth, n, r in contacts]
             step = beta / max(rates)
             shift, turn = step * push, step * spin
-        places[i] = (x[i] + shift) % side
+        places[i] = np.where(periodic, (x[i] + shift) % side, x[i] + shift)
         orientations[i] = Rotation.from_rotvec(turn).as_matrix() @ body
     return places, orientations
 

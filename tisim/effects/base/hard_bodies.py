@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tisim.backend.taichi import ti
-from tisim.effects.base.confinement import Confinement, confinement
+from tisim.effects.base.confinement import confinement
 from tisim.effects.base.effect import SceneParts
 from tisim.effects.base.pairwise import Pairwise
-from tisim.errors import Words, must
+from tisim.errors import must
 from tisim.numerics.vectors import rotated
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.state.fields import Field
@@ -89,14 +89,14 @@ class HardBodies(Pairwise):
         return 2 * float(self.shapes()[0].half_extents().min()) * float(self.sizes(start)[0])
 
     def check(self, scene: SceneParts) -> None:
-        walls = [effect for effect in scene.effects if isinstance(effect, Confinement)]
-        for around in walls:
-            container, name = around.container.kind(), f"effects.{around.label}"
-            must(len(walls) == 1, name, "the only confinement of a scene", Words(f"{len(walls)} of them"))
-            rule = f"rods or spheres in a {container}, which touch curved walls with round ends"
-            must(self.round_ends or not around.container.curved, f"effects.{self.label}", rule, self.kind())
-            known = self.offers("support") and (around.treatment == "exact" or self.offers("closest_virtual"))
-            must(known, f"{name}.treatment", f"one for {self.kind()}", around.treatment)
+        around = confinement(scene)
+        if around is None:
+            return
+        container = around.container
+        rule = f"rods or spheres in a {container.kind()}, as round ends touch curved walls"
+        must(self.round_ends or not container.curved, f"effects.{self.label}", rule, self.kind())
+        known = self.offers("support") and (around.treatment == "exact" or self.offers("closest_virtual"))
+        must(known, f"effects.{around.label}.treatment", f"one for {self.kind()}", around.treatment)
 
     @ti.func
     def size(self, s, w, i):

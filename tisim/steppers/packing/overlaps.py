@@ -66,7 +66,7 @@ class BodySum(PairSum):
         gap, outward = confinement.container.wall(w, wall, place, self.domain.side(w), size)
         here = self.bodies.support(s, w, i, end, outward)
         depth, normal = (here - middle).dot(outward) - gap, outward
-        if ti.static(confinement.treatment == "virtual"):
+        if ti.static(confinement.treatment == "virtual"):  # noqa: SIM102
             if depth > 0.0 and depth < DEEPEST_VIRTUAL * size:
                 point, along = here - depth * outward, confinement.container.along(w, wall, outward)
                 gap, normal, here, _there = self.bodies.closest_virtual(s, w, i, point, outward, along)
@@ -116,7 +116,10 @@ class SumOverlaps(BodySum):
     @ti.func
     def wall_term(self, w, i, depth, counts, normal, here):
         size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
-        push = -ti.select(counts, self.stepper.weight(depth / size), 0.0) * normal
+        # Unlike another body, a wall may be deeper than D; the weight of the original method would change its
+        # sign there.
+        weight = self.stepper.weight(ti.min(depth / size, DEEPEST_VIRTUAL))
+        push = -ti.select(counts, weight, 0.0) * normal
         turn, over = here.cross(push), ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
         return ti.Vector([push[0], push[1], push[2], turn[0], turn[1], turn[2], over])
 
