@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.compare import same_arrays
-from tests.steppers.packing.test_mechanical_contraction import ROD, SPHERE, attempt, contact
+from tests.steppers.packing.test_mechanical_contraction import ROD, SPHERE, attempt, rod_contact
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Confinement, HardRods
 from tisim.engine.checkpoint import restore, save
@@ -93,7 +93,7 @@ def reference_walls(container, side, shape, treatment, seen):
                 if treatment == "virtual" and 0 < depth < radius:
                     # B16: at the distance R beyond the wall.
                     beyond = end + (gap + radius) * outward
-                    depth, normal, here, _ = contact(beyond, axis, direction(outward), half, radius)
+                    depth, normal, here, _ = rod_contact(beyond, axis, direction(outward), half, radius)
                     seen.append(depth - (radius - gap))
                 found.append((depth, -normal, here))
         return found
@@ -147,7 +147,7 @@ def deepest(result):
         d -= np.where(result.scene.domain.periodic, side * np.round(d / side), 0)
         for j in np.flatnonzero(np.linalg.norm(d, axis=1) < 2 * result.state["radius"][0]):
             half, radius = size * rod.length / 2, size * rod.diameter / 2
-            depths.append(contact(d[j], axes[i], axes[j], half, radius)[0] / (2 * radius))
+            depths.append(rod_contact(d[j], axes[i], axes[j], half, radius)[0] / (2 * radius))
     return max(depths)
 
 
@@ -344,14 +344,3 @@ def test_what_does_not_fit_is_refused():
     longer = made.start() | {"radius": np.linspace(1.0, 1.1, 80)}
     with pytest.raises(InputError, match=r"particles.radius must be in one ratio to their shapes"):
         bodies.check_start(longer, made)
-
-
-def test_a_container_must_be_long_enough_at_the_highest_density():
-    """A rod is 2.5 m long, so the cylinder must be 5 m long at a packing fraction of 0.75, for 29 rods of a
-    cylinder of 4 m."""
-    least = 0.75 * np.pi / 4 * 16 * 5 / ROD.volume()
-    made = scene(CYLINDER, number=int(least) + 1)
-    made.effects[0].check_start(made.start(), made)
-    made = scene(CYLINDER, number=int(least))
-    with pytest.raises(InputError, match=r"box must be at least 5 m wide at a packing fraction of 0.75"):
-        made.effects[0].check_start(made.start(), made)
