@@ -12,7 +12,7 @@ from tisim.describe import reference
 
 DOCS = Path(__file__).parents[1] / "docs"
 FAMILIES = ("effects", "sources", "operators", "contact_parts", "steppers", "step_controls")
-PACKED = ("hard_rods", "mechanical_contraction", "energy_minimisation", "attempts")
+PACKED = ("hard_rods", "mechanical_contraction", "energy_minimisation", "monte_carlo_growth", "attempts")
 """Parts of packings, which two bodies do not make; docs/packings.md has their scene."""
 PARTS = [
     entry.name

@@ -14,7 +14,7 @@ from tisim import steppers
 from tisim.components import serialization
 from tisim.steppers import StepControl, Stepper
 
-PACKED = {"mechanical_contraction", "energy_minimisation", "attempts"}
+PACKED = {"mechanical_contraction", "energy_minimisation", "monte_carlo_growth", "attempts"}
 """Parts of packings; tests/steppers/packing has the ends of their ranges."""
 
 

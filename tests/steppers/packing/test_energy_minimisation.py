@@ -15,7 +15,9 @@ RELATIVE = 1 + 1e-9
 """Overlaps are recomputed in NumPy."""
 
 
-def scene(shape, number, packed=0.2, seed=0, duration=1e6, spread=0.0, **settings):
+def scene(
+    shape, number, packed=0.2, seed=0, duration=1e6, spread=0.0, stepper=EnergyMinimisation, **settings
+):
     """Bodies at random places of a cubic box; they may overlap. spread : relative range of their sizes."""
     side, draw = (number * shape.volume() / packed) ** (1 / 3), np.random.default_rng(seed)
     particles = Particles(
@@ -29,7 +31,7 @@ def scene(shape, number, packed=0.2, seed=0, duration=1e6, spread=0.0, **setting
         effects=[HardRods(rods=(shape,))],
         domain=Box(low=(0, 0, 0), high=(side, side, side)),
         duration=duration,
-        stepper=EnergyMinimisation(**settings),
+        stepper=stepper(**settings),
         seed=seed,
     )
 

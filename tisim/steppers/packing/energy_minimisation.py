@@ -25,13 +25,15 @@ from tisim.steppers.packing.overlaps import (
 )
 from tisim.steppers.packing.packing_stepper import (
     ACCEPTED_FIELDS,
+    ATTEMPT_FIELDS,
     CONTRACT,
     MOVE,
     PACKING_FIELDS,
     RETURN,
     BeginAttempt,
-    MoveBodies,
+    MoveOrReturn,
     PackingStepper,
+    body_volume,
 )
 from tisim.steppers.verlet import Advance
 
@@ -88,6 +90,7 @@ class EnergyMinimisation(PackingStepper):
 
     world_fields: ClassVar = (
         *PACKING_FIELDS,
+        *ATTEMPT_FIELDS,
         WorldField("contractions", "counter"),
         WorldField("bisections", "counter"),
         WorldField("packing_fraction", "measure"),
@@ -150,8 +153,7 @@ class SumPower(PerBlock):
         terms[SPEED_SQUARE] = ti.cast(speed.norm_sqr() + momentum.dot(spin), ti.f64)
         terms[FORCE_SQUARE] = ti.cast(force.norm_sqr() + torque.dot(speeding), ti.f64)
         terms[OVERLAP_SUM] = ti.cast(s.overlap_energy[w, i], ti.f64)
-        size = ti.cast(self.bodies.size(s, w, i), ti.f64)
-        terms[BODY_VOLUME] = ti.cast(self.bodies.volume(w, s.shape[w, i]), ti.f64) * size * size * size
+        terms[BODY_VOLUME] = body_volume(s, self.bodies, w, i)
         return terms
 
 
@@ -247,7 +249,7 @@ class MinimiseOrGrow(Phase):
             s.growth[w] = elementary.pow(aim / density, 1.0 / 3.0)
 
 
-class FollowForces(MoveBodies):
+class FollowForces(MoveOrReturn):
     """This phase moves and turns each body by a step of FIRE."""
 
     @ti.func
