@@ -80,7 +80,9 @@ class EnergyMinimisation(PackingStepper):
     Guenole et al., Comput. Mater. Sci. 175 (2020) 109584 (FIRE 2.0).
     """
 
-    fraction_step: float = parameter("", "increase of the packing fraction until it is bisected", 0.01, gt=0)
+    fraction_step: float = parameter(
+        "", "increase of the packing fraction until it is bisected", 0.01, gt=0, le=0.1
+    )
     precision: float = parameter("", "difference of densities at which bisection ends", 1e-5, gt=0)
     tolerance: float = parameter("D", "overlap that is permitted", 1e-4, gt=0)
     balance: float = parameter("", "net force over contact forces at which forces balance", 1e-3, gt=0)

@@ -68,11 +68,13 @@ class MonteCarloGrowth(PackingStepper):
     and the counter ``jammed`` is 1 if it has ended so. One step takes the time ``dt`` of the control, so the
     duration of a run is the largest number of steps.
 
-    Source: B. D. Lubachevsky, F. H. Stillinger, J. Stat. Phys. 60 (1990) 561, for growth at a rate; trial
-    moves and their rule: own.
+    Source: B. D. Lubachevsky, F. H. Stillinger, J. Stat. Phys. 60 (1990) 561, for growth at a rate;
+    docs/packings.md for the rule of the moves.
     """
 
-    rate: float = parameter("", "growth of the radius in a step over the length of trial moves", 0.1, gt=0)
+    rate: float = parameter(
+        "", "growth of the radius in a step over the length of trial moves", 0.1, gt=0, le=1
+    )
     precision: float = parameter("D", "length of trial moves below which a world ends", 1e-4, gt=0)
     acceptance: float = parameter("", "fraction of trial moves that are accepted", 0.2, gt=0, lt=1)
 
