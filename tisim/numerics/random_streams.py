@@ -5,6 +5,8 @@ Two uses of one seed with the same stream would draw the same numbers. A stream 
 
 BROWNIAN_MOTION = 1
 """Stream of the thermal noise of Brownian steppers."""
+TRIAL_MOVES = 0x54524D56
+"""Stream of the trial moves of growing hard bodies."""
 SEQUENTIAL_ADDITION = 0x52534100
 """Stream of the trial positions of random sequential addition."""
 GRAIN_SIZES = 0x47524149

@@ -20,6 +20,7 @@ from .implicit.trapezoid import Trapezoid as Trapezoid
 from .langevin import Langevin as Langevin
 from .packing.energy_minimisation import EnergyMinimisation as EnergyMinimisation
 from .packing.mechanical_contraction import MechanicalContraction as MechanicalContraction
+from .packing.monte_carlo_growth import MonteCarloGrowth as MonteCarloGrowth
 from .step_control import (
     ApproachTime as ApproachTime,
 )

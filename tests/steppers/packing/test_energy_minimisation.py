@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.compare import same_arrays
-from tests.steppers.packing.test_mechanical_contraction import ROD, SPHERE, contact, deepest, fraction
+from tests.steppers.packing.test_mechanical_contraction import ROD, SPHERE, deepest, fraction, rod_contact
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Gravity, HardRods
 from tisim.engine.checkpoint import restore, save
@@ -15,7 +15,9 @@ RELATIVE = 1 + 1e-9
 """Overlaps are recomputed in NumPy."""
 
 
-def scene(shape, number, packed=0.2, seed=0, duration=1e6, spread=0.0, **settings):
+def scene(
+    shape, number, packed=0.2, seed=0, duration=1e6, spread=0.0, stepper=EnergyMinimisation, **settings
+):
     """Bodies at random places of a cubic box; they may overlap. spread : relative range of their sizes."""
     side, draw = (number * shape.volume() / packed) ** (1 / 3), np.random.default_rng(seed)
     particles = Particles(
@@ -29,7 +31,7 @@ def scene(shape, number, packed=0.2, seed=0, duration=1e6, spread=0.0, **setting
         effects=[HardRods(rods=(shape,))],
         domain=Box(low=(0, 0, 0), high=(side, side, side)),
         duration=duration,
-        stepper=EnergyMinimisation(**settings),
+        stepper=stepper(**settings),
         seed=seed,
     )
 
@@ -62,7 +64,7 @@ def pair(d, axis_i, axis_j, size_i, size_j, shape):
     """Gap, normal from i to j and points of contact of two rods of different sizes."""
     # The segments of both are scaled to one length along their axes.
     half, thick = shape.length / 2, shape.diameter / 2
-    _, normal, here, there = contact(d, size_i * axis_i, size_j * axis_j, half, 0.0)
+    _, normal, here, there = rod_contact(d, size_i * axis_i, size_j * axis_j, half, 0.0)
     gap = normal @ (d + there - here) - thick * (size_i + size_j)
     return gap, normal, here + thick * size_i * normal, there - thick * size_j * normal
 

@@ -44,9 +44,8 @@ class HardRods(HardBodies):
     @ti.func
     def axis(self, s, w, i):
         """Return the unit vector along a rod."""
-        along = 0.0 * s.position[w, i]
-        along[2] += 1.0
-        return rotated(self.turn(s, w, i), along)
+        q = self.turn(s, w, i)
+        return rotated(q, ti.Vector([0.0 * q[0], 0.0 * q[0], 1.0 + 0.0 * q[0]]))
 
     @ti.func
     def half(self, s, w, i):

@@ -24,13 +24,15 @@ from tisim.steppers.packing.overlaps import (
 )
 from tisim.steppers.packing.packing_stepper import (
     ACCEPTED_FIELDS,
+    ATTEMPT_FIELDS,
     CONTRACT,
     MOVE,
     PACKING_FIELDS,
     RETURN,
     BeginAttempt,
-    MoveBodies,
+    MoveOrReturn,
     PackingStepper,
+    body_volume,
 )
 from tisim.steppers.packing.space import CheckWidth, PackingSpace
 from tisim.steppers.verlet import Advance
@@ -78,7 +80,9 @@ class EnergyMinimisation(PackingStepper):
     Guenole et al., Comput. Mater. Sci. 175 (2020) 109584 (FIRE 2.0).
     """
 
-    fraction_step: float = parameter("", "increase of the packing fraction until it is bisected", 0.01, gt=0)
+    fraction_step: float = parameter(
+        "", "increase of the packing fraction until it is bisected", 0.01, gt=0, le=0.1
+    )
     precision: float = parameter("", "difference of densities at which bisection ends", 1e-5, gt=0)
     tolerance: float = parameter("D", "overlap that is permitted", 1e-4, gt=0)
     balance: float = parameter("", "net force over contact forces at which forces balance", 1e-3, gt=0)
@@ -88,6 +92,7 @@ class EnergyMinimisation(PackingStepper):
 
     world_fields: ClassVar = (
         *PACKING_FIELDS,
+        *ATTEMPT_FIELDS,
         WorldField("contractions", "counter"),
         WorldField("bisections", "counter"),
         WorldField("packing_fraction", "measure"),
@@ -151,8 +156,7 @@ class SumPower(PerBlock):
         terms[SPEED_SQUARE] = ti.cast(speed.norm_sqr() + momentum.dot(spin), ti.f64)
         terms[FORCE_SQUARE] = ti.cast(force.norm_sqr() + torque.dot(speeding), ti.f64)
         terms[OVERLAP_SUM] = ti.cast(s.overlap_energy[w, i], ti.f64)
-        size = ti.cast(self.bodies.size(s, w, i), ti.f64)
-        terms[BODY_VOLUME] = ti.cast(self.bodies.volume(w, s.shape[w, i]), ti.f64) * size * size * size
+        terms[BODY_VOLUME] = body_volume(s, self.bodies, w, i)
         return terms
 
 
@@ -248,7 +252,7 @@ class MinimiseOrGrow(Phase):
             s.growth[w] = self.space.growth(aim, density)
 
 
-class FollowForces(MoveBodies):
+class FollowForces(MoveOrReturn):
     """This phase moves and turns each body by a step of FIRE."""
 
     @ti.func

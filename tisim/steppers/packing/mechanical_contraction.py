@@ -25,12 +25,13 @@ from tisim.steppers.packing.overlaps import (
 )
 from tisim.steppers.packing.packing_stepper import (
     ACCEPTED_FIELDS,
+    ATTEMPT_FIELDS,
     CONTRACT,
     MOVE,
     PACKING_FIELDS,
     RETURN,
     BeginAttempt,
-    MoveBodies,
+    MoveOrReturn,
     PackingStepper,
 )
 from tisim.steppers.packing.space import CheckWidth, PackingSpace
@@ -76,6 +77,7 @@ class MechanicalContraction(PackingStepper):
 
     world_fields: ClassVar = (
         *PACKING_FIELDS,
+        *ATTEMPT_FIELDS,
         WorldField("contractions", "counter"),
         WorldField("halved", "integer"),
         WorldField("box_volume", "real"),
@@ -180,7 +182,7 @@ class ScaleTwist(PerParticle):
         s.overlap_twist[w, i] = s.overlap_twist[w, i] / (self.stepper.inertia(w) * moment)
 
 
-class RemoveOverlaps(MoveBodies):
+class RemoveOverlaps(MoveOrReturn):
     """This phase moves each body out of its overlaps."""
 
     @ti.func

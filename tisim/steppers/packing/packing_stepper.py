@@ -14,6 +14,7 @@ from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.numerics.vectors import product
 from tisim.program.phases import PerParticle, Phase
+from tisim.program.scans import BlockSums, PerBlock
 from tisim.state.fields import Field, WorldField
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import apply_displacement
@@ -27,14 +28,10 @@ ACCEPTED_FIELDS = (
     Field("accepted_radius", "m", 1, "keep", default="radius"),
 )
 """The last configuration without overlaps; part of checkpoints, because a run may return to it."""
-PACKING_FIELDS = (
-    WorldField("overlapping", "sum"),
-    WorldField("attempted", "integer"),
-    WorldField("packing_action", "integer"),
-    WorldField("growth", "real"),
-)
-"""The number of bodies with overlaps, the attempts to remove them, the action of the step, and the factor by
-which it enlarges the bodies."""
+PACKING_FIELDS = (WorldField("overlapping", "sum"), WorldField("growth", "real"))
+"""The number of bodies with overlaps, and the factor by which a step enlarges bodies."""
+ATTEMPT_FIELDS = (WorldField("attempted", "integer"), WorldField("packing_action", "integer"))
+"""The attempts to remove the overlaps of a contraction, and the action of a step."""
 MOVE, CONTRACT, RETURN = 0, 1, 2
 """What a step does: remove overlaps, contract a configuration without overlaps, or return to the last one."""
 
@@ -50,11 +47,14 @@ class PackingStepper(Stepper):
     """Packing steppers bring hard bodies together in a periodic box of constant size: the bodies grow.
 
     The phases of a step end with ``BeginStep``, a subclass of ``MoveBodies``, ``CheckWidth`` and ``Advance``.
-    Before these, a step sets ``packing_action`` and ``growth`` of the world.
+    Before these, a step sets ``growth`` of the world.
+
+    confines : whether bodies may be packed between walls.
     """
 
     contract: ClassVar[bool] = True
     packs: ClassVar = True
+    confines: ClassVar[bool] = True
     control: Attempts = option("time of an attempt", Attempts())
 
     def check(self, scene: SceneParts) -> None:
@@ -64,16 +64,47 @@ class PackingStepper(Stepper):
              [effect.label for effect in scene.effects])  # fmt: skip
         for effect in scene.effects:
             rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
-            packed = effect is bodies[0] or isinstance(effect, Confinement)
+            packed = effect is bodies[0] or (self.confines and isinstance(effect, Confinement))
             must(packed, f"effects.{effect.label}", rule, effect.kind())
         low, _high = scene.domain.bounds()
         # A confinement checks the axes of its box.
         closed = low is not None and (all(scene.domain.imaged()) or confinement(scene) is not None)
-        rule = f"a periodic box for {self.kind()}, or one with an effect confinement"
+        rule = f"a periodic box for {self.kind()}" + ", or one with an effect confinement" * self.confines
         must(closed, "domain", rule, scene.domain.kind())
 
     def independent(self, effects: Sequence[Effect]) -> bool:
         return False
+
+
+@ti.func
+def rotated_by(turn, orientation):
+    """Return an orientation, a unit quaternion, after a rotation by a rotation vector (rad)."""
+    angle, q = turn.norm(), orientation
+    if angle > 0.0:
+        half = 0.5 * angle
+        u = elementary.sin(half) / angle * turn
+        q = product(ti.Vector([elementary.cos(half), u[0], u[1], u[2]]), orientation)
+        q = q / q.norm()
+    return q
+
+
+@ti.func
+def body_volume(s, bodies: ti.template(), w, i):  # type: ignore[valid-type]
+    """Return the volume (m^3, f64) of a body."""
+    size = ti.cast(bodies.size(s, w, i), ti.f64)
+    return ti.cast(bodies.volume(w, s.shape[w, i]), ti.f64) * size * size * size
+
+
+class SumVolumes(PerBlock):
+    """This phase sums the volumes of bodies."""
+
+    def __init__(self, sums: BlockSums, bodies: Any) -> None:
+        super().__init__(sums)
+        self.bodies = bodies
+
+    @ti.func
+    def each(self, w, i):
+        return ti.Vector([body_volume(self.s, self.bodies, w, i)], dt=ti.f64)
 
 
 class BeginAttempt(Phase):
@@ -88,8 +119,7 @@ class BeginAttempt(Phase):
 
 
 class MoveBodies(PerParticle):
-    """This phase moves and turns each body, or puts it back to the last configuration without overlaps, and
-    lets it grow. A subclass defines ``motion``."""
+    """This phase moves and turns each body and lets it grow. A subclass defines ``motion``."""
 
     def __init__(self, context: StepContext, bodies: Any) -> None:
         super().__init__(context.s)
@@ -100,6 +130,41 @@ class MoveBodies(PerParticle):
     def run(self, w, i):
         s = self.s
         before, radius, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
+        place, far = self.change(w, i, before, radius)
+        growth = ti.cast(s.growth[w], s.real)
+        s.radius[w, i] = s.radius[w, i] * growth
+        place = self.space.grown(w, place, growth)
+        grown = ti.cast(s.radius[w, i] - radius, ti.f64) + ti.cast(far, ti.f64)
+        path = self.domain.nearest(w, before, place, end)
+        apply_displacement(s, self.domain, w, i, place, ti.cast(path, ti.f64), grown, end)
+
+    @ti.func
+    def change(self, w, i, before, radius):
+        """Turn a body; return its new place (m) and the distance (m) by which its surface has turned."""
+        shift, turn = self.motion(w, i)
+        self.rotate(w, i, turn)
+        return before + shift, turn.norm() * radius
+
+    @ti.func
+    def motion(self, w, i):
+        """Return the displacement (m) and the rotation vector (rad) of a body."""
+        return 0.0 * self.s.position[w, i], 0.0 * self.s.position[w, i]
+
+    @ti.func
+    def rotate(self, w, i, turn):
+        """Turn a body by a rotation vector (rad)."""
+        s = self.s
+        q = rotated_by(turn, self.bodies.turn(s, w, i))
+        for k in ti.static(range(4)):
+            s.orientation[w, i, k] = q[k]
+
+
+class MoveOrReturn(MoveBodies):
+    """This phase also keeps the configurations that are contracted, and puts bodies back to the last one."""
+
+    @ti.func
+    def change(self, w, i, before, radius):
+        s = self.s
         place, far = before, ti.cast(0.0, s.real)
         if s.packing_action[w] == MOVE:
             shift, turn = self.motion(w, i)
@@ -119,30 +184,8 @@ class MoveBodies(PerParticle):
             self.rest(w, i)
             # Lists are rebuilt, whatever has changed since.
             far = 2.0 * radius
-        growth = ti.cast(s.growth[w], s.real)
-        s.radius[w, i] = s.radius[w, i] * growth
-        place = self.space.grown(w, place, growth)
-        grown = ti.cast(s.radius[w, i] - radius, ti.f64) + ti.cast(far, ti.f64)
-        path = self.domain.nearest(w, before, place, end)
-        apply_displacement(s, self.domain, w, i, place, ti.cast(path, ti.f64), grown, end)
-
-    @ti.func
-    def motion(self, w, i):
-        """Return the displacement (m) and the rotation vector (rad) of a body."""
-        return 0.0 * self.s.position[w, i], 0.0 * self.s.position[w, i]
+        return place, far
 
     @ti.func
     def rest(self, w, i):
         """Stop a body, in a step that does not move it."""
-
-    @ti.func
-    def rotate(self, w, i, turn):
-        """Turn a body by a rotation vector (rad)."""
-        s, angle = self.s, turn.norm()
-        if angle > 0.0:
-            half = 0.5 * angle
-            u = elementary.sin(half) / angle * turn
-            q = product(ti.Vector([elementary.cos(half), u[0], u[1], u[2]]), self.bodies.turn(s, w, i))
-            q = q / q.norm()
-            for k in ti.static(range(4)):
-                s.orientation[w, i, k] = q[k]
