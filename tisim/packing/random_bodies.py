@@ -19,7 +19,7 @@ MOST_TRIED = 200_000_000
 """Largest number of places that are tried for a start."""
 PARALLEL = 1e-12
 """Squared sine of the angle below which rods count as parallel."""
-ROUNDING = 1e-12
+WALL_ROUNDING = 1e-12
 """Bodies may cross a wall by this part of D, which is lost to rounding."""
 
 
@@ -82,7 +82,7 @@ def random_bodies(
         places, turns = side * numbers, Rotation.random(some, rng=generator).as_quat(scalar_first=True)
         if container is not None:
             places = container.points(numbers, side, unit, unit / 2)
-            inside = wall_gaps(shape, places, turns, container, side).min(axis=1) >= -ROUNDING * unit
+            inside = wall_gaps(shape, places, turns, container, side).min(axis=1) >= -WALL_ROUNDING * unit
             places, turns = places[inside], turns[inside]
         # The lower face of a periodic box belongs to it, the upper one does not.
         places = np.minimum(places, np.nextafter(side, 0.0))
