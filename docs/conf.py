@@ -35,6 +35,7 @@ python_use_unqualified_type_names = True
 OTHERS = (
     "numpy",
     "np",
+    "scipy",
     "pathlib",
     "collections",
     "typing",

@@ -28,7 +28,7 @@ from tisim.effects import (
     DerivedQuantity,
     Effect,
     Granular,
-    HardRods,
+    HardBodies,
     Impact,
     InducedMoment,
     LangevinMoment,
@@ -46,6 +46,7 @@ from tisim.effects.magnetic.moment import MOMENT
 from tisim.engine.assembly import needed_fields
 from tisim.packing.clump import clump_columns, sphere_columns
 from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Source
+from tisim.steppers.packing.mechanical_contraction import Attempts
 
 MAGNITUDES = (
     5e-324, 2.3e-308, 1e-300, 1e-155, 1e-100, 1e-60, 1e-30, 1e-15, 1e-9, 1e-3, 0.5, math.nextafter(1.0, 0.0),
@@ -176,15 +177,16 @@ EACH = {"group": [1, 0, 0]} | {
 FLUID = {"temperature": 300.0, "viscosity": 1e-3}
 
 
-PACKED = (Confinement, HardRods)
-"""Hard bodies and their walls, which need a packing stepper and more bodies; see tests/steppers/packing."""
+def for_packings(kind: type) -> bool:
+    """Whether a part belongs to packings, whose scenes have many bodies; tests/steppers/packing has them."""
+    return issubclass(kind, HardBodies | Confinement | Attempts) or getattr(kind, "packs", False)
 
 
 @cache
 def scenes() -> dict[str, dict[str, Any]]:
     """Scenes as plain data, by name: one for each effect, source and operator, and those for each stepper."""
     serialization.load(steppers)
-    kinds = [kind for kind in known_effects() if kind not in PACKED]
+    kinds = [kind for kind in known_effects() if not for_packings(kind)]
     scenes_by_name = {f"effects.{kind.kind()}": _scene(_company(kind)) for kind in kinds}
     for name in sorted(CONTROLLED):
         fluid = FLUID if name in ("brownian", "langevin") else {}

@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 from scipy.constants import G
 
+from tests.extremes import for_packings
 from tisim.describe import reference
 
 DOCS = Path(__file__).parents[1] / "docs"
 FAMILIES = ("effects", "sources", "operators", "contact_parts", "steppers", "step_controls")
-PACKED = ("confinement", "hard_rods", "mechanical_contraction", "attempts")
-"""Parts of packings, which two bodies do not make; docs/packings.md has their scene."""
 PARTS = [
     entry.name
     for entry in reference.entries()
-    if entry.family in FAMILIES and entry.kind.__module__.startswith("tisim.") and entry.name not in PACKED
+    if entry.family in FAMILIES
+    and entry.kind.__module__.startswith("tisim.")
+    # Two bodies make no packing; docs/packings.md has its scenes.
+    and not for_packings(entry.kind)
 ]
 QUICK = ("stokes_drag", "induced_moment")
 

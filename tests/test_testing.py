@@ -41,7 +41,6 @@ from tisim.steppers import (
     FixedStep,
     IterationControl,
     Langevin,
-    MechanicalContraction,
     StageControl,
     Step,
     Stepper,
@@ -123,7 +122,7 @@ def test_every_stepper_is_tried():
     tried = {type(stepper) for stepper, _ in STEPPERS.values()}
     own = {kind for kind in Stepper.known().values() if kind.__module__.startswith("tisim.")}
     # Hard bodies have no laws of their own; tests/steppers/packing finds missing pairs.
-    assert tried == own - {MechanicalContraction}
+    assert tried == {kind for kind in own if not extremes.for_packings(kind)}
 
 
 @pytest.mark.slow
@@ -246,7 +245,7 @@ def is_short_ranged(kind):
     return any(type(effect) is kind and getattr(effect, "short_ranged", False) for effect in effects)
 
 
-SHORT = [kind for kind in known_effects() if kind not in extremes.PACKED and is_short_ranged(kind)]
+SHORT = [kind for kind in known_effects() if not extremes.for_packings(kind) and is_short_ranged(kind)]
 
 
 @pytest.mark.slow
@@ -364,7 +363,10 @@ HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 DIPOLES = [DipoleDipole, TruncatedDipoleDipole]
 APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED, *DIPOLES)
-TOGETHER = [*(kind for kind in known_effects() if kind not in (*APART, *extremes.PACKED)), Outflow]
+TOGETHER = [
+    *(kind for kind in known_effects() if kind not in APART and not extremes.for_packings(kind)),
+    Outflow,
+]
 
 
 @pytest.mark.long

@@ -81,6 +81,16 @@ SOFT_GRAINS = {
         "0.4 * self.size(s, w, i) * self.rods.diameter",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[revised]",
     ),
+    "hard_ellipsoids": (
+        f"{CONTACT}/hard_superquadrics.py", "return self.ellipsoids.semi_axes(w, k)",
+        "return 0.9 * self.ellipsoids.semi_axes(w, k)",
+        "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[ellipsoids]",
+    ),
+    "hard_superquadrics": (
+        f"{CONTACT}/hard_superquadrics.py", "return self.superquadrics.exponents(w, k)",
+        "return 2.0 + 0.0 * self.superquadrics.exponents(w, k)",
+        "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[cuboids]",
+    ),
     "confinement": (
         "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
         "tests/steppers/packing/test_confinement.py::"
@@ -102,7 +112,7 @@ SOFT_GRAINS = {
         f"{CONTACT}/bond.py", "if e >= self.threshold(w)", "if e >= 0.9 * self.threshold(w)", f"{LAWS}[bond]",
     ),
 }  # fmt: skip
-"""Mutations of hard rods, and of the laws of Z16."""
+"""Mutations of hard bodies, and of the laws of Z16."""
 BONDS = "tests/effects/contact/test_bonds.py::test_"
 BONDED = {
     "capillary_bridge": (

@@ -1,4 +1,4 @@
-"""Analysis of results in NumPy: structure and flow of particles."""
+"""Analysis of results: structure, flow and packings of particles."""
 
 import lazy_loader
 

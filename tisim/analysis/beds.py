@@ -53,9 +53,9 @@ def coordination_numbers(number: int, pairs: np.ndarray) -> np.ndarray:
     return np.bincount(np.asarray(pairs).ravel(), minlength=number)
 
 
-def rattling(number: int, pairs: np.ndarray) -> np.ndarray:
-    """Return which of ``number`` grains are rattlers: grains with fewer than four contacts with non-rattlers;
-    shape (number,).
+def rattling(number: int, pairs: np.ndarray, fewest: int = FEWEST_CONTACTS) -> np.ndarray:
+    """Return which of ``number`` grains are rattlers: grains with fewer than ``fewest`` contacts with
+    non-rattlers; shape (number,).
 
     Source: C. Thornton, Geotechnique 50 (2000) 43.
     """
@@ -63,7 +63,7 @@ def rattling(number: int, pairs: np.ndarray) -> np.ndarray:
     while held.sum() != before:
         # Contacts with rattlers do not count.
         before, pairs = int(held.sum()), pairs[held[pairs].all(axis=1)]
-        held &= coordination_numbers(number, pairs) >= FEWEST_CONTACTS
+        held &= coordination_numbers(number, pairs) >= fewest
     return ~held
 
 

@@ -25,6 +25,16 @@ class ShellVolumes(NamedTuple):
     left_out: np.ndarray
 
 
+class VoronoiFacets(NamedTuple):
+    """Facets of Voronoi cells, each from both of its sides: index of the particle of a cell, index of its
+    neighbour, neighbour minus particle (m, shape (k, 3)), and area (m^2)."""
+
+    particle: np.ndarray
+    neighbour: np.ndarray
+    separation: np.ndarray
+    area: np.ndarray
+
+
 def voronoi_volumes(position: np.ndarray, sides: Sides = None) -> np.ndarray:
     """Return the volume (m^3) of the Voronoi cell of each position (n, 3), m; NaN for unbounded cells, as at
     the surface of a sample in open space; shape (n,).
@@ -60,6 +70,24 @@ def voronoi_by_shell(position: np.ndarray, ellipsoid: Ellipsoid, shells: int) ->
     total = np.bincount(shell[known & closed], volume[known & closed], shells)
     mean = total / np.where(count > 0, count, np.nan)
     return ShellVolumes(mean, count, everybody - count)
+
+
+def voronoi_facets(position: np.ndarray, sides: Sides = None) -> VoronoiFacets:
+    """Return the bounded facets of the Voronoi cells of positions (n, 3), m.
+
+    sides : side lengths of a periodic box, as for ``voronoi_volumes``.
+    """
+    r, vectors = np.asarray(position, float), vectors_of(sides)
+    diagram = _cells(r, sides)[1]
+    ends, area = diagram.ridge_points, _areas(diagram)
+    ends, area = (np.concatenate([ends, ends[:, ::-1]]), np.tile(area, 2))
+    kept = (ends[:, 0] < len(r)) & np.isfinite(area)
+    i, j = ends[kept].T
+    points = diagram.points
+    # Images lie on particles if they are moved into the box.
+    inside, of = with_images(points[: len(r)], 0.0, vectors)
+    number = of[cKDTree(inside).query(with_images(points, 0.0, vectors)[0][: len(points)])[1]]
+    return VoronoiFacets(i, number[j], points[j] - points[i], area[kept])
 
 
 def _cells(r: np.ndarray, sides: Sides) -> tuple[np.ndarray, Voronoi]:
@@ -143,6 +171,14 @@ def _is_whole(diagram: Voronoi, r: np.ndarray, vectors: np.ndarray) -> bool:
 def _volumes(diagram: Voronoi) -> np.ndarray:
     """Return the volumes of all cells as sums of pyramids over the facets, which lie half-way to
     neighbours."""
+    i, j = diagram.ridge_points.T
+    part = _areas(diagram) * np.linalg.norm(diagram.points[i] - diagram.points[j], axis=1) / 6
+    number = len(diagram.points)
+    return np.asarray(np.bincount(i, part, number) + np.bincount(j, part, number))
+
+
+def _areas(diagram: Voronoi) -> np.ndarray:
+    """Return the areas of all facets; NaN for unbounded ones."""
     corners, ridge = _flat(diagram)
     begins = np.flatnonzero(np.diff(ridge, prepend=-1))
     following = np.arange(1, len(corners) + 1)
@@ -151,10 +187,7 @@ def _volumes(diagram: Voronoi) -> np.ndarray:
     a, b = (diagram.vertices[some] - first for some in (corners, corners[following]))
     area = np.linalg.norm(np.add.reduceat(np.cross(a, b), begins), axis=1) / 2
     area[np.minimum.reduceat(corners, begins) < 0] = np.nan
-    i, j = diagram.ridge_points.T
-    part = area * np.linalg.norm(diagram.points[i] - diagram.points[j], axis=1) / 6
-    number = len(diagram.points)
-    return np.asarray(np.bincount(i, part, number) + np.bincount(j, part, number))
+    return np.asarray(area)
 
 
 def _flat(diagram: Voronoi) -> tuple[np.ndarray, np.ndarray]:

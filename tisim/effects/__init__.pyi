@@ -115,6 +115,8 @@ from .contact.granular.twisting import (
 from .contact.granular.viscoelastic import ViscoelasticDamping as ViscoelasticDamping
 from .contact.granular.viscous import ViscousFriction as ViscousFriction
 from .contact.hard_rods import HardRods as HardRods
+from .contact.hard_superquadrics import HardEllipsoids as HardEllipsoids
+from .contact.hard_superquadrics import HardSuperquadrics as HardSuperquadrics
 from .contact.hertz import Hertz as Hertz
 from .contact.normal import NormalContact as NormalContact
 from .contact.parallel_bond import ParallelBond as ParallelBond

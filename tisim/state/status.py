@@ -33,6 +33,8 @@ class WorldStatus(IntEnum):
     """Grains move so far in a step that they may pass through each other undetected."""
     OVERLAPPING = 13
     """The overlaps of the start of a packing could not be removed."""
+    BOX_TOO_NARROW = 14
+    """Bodies have grown so long that two of them may touch at two periodic images at once."""
 
 
 NO_ONE = 2**31 - 1

@@ -21,8 +21,6 @@ ORIENTATION = Field("orientation", "", 1, "keep", slots=4)
 """Orientation of a body, a unit quaternion w, x, y, z from its body frame to space."""
 SHAPE = Field("shape", "", 1, "keep", integer=True, minimum=0.0)
 """Index of the shape of a body."""
-DENSEST_PACKING = 0.75
-"""Packing fraction up to which a box must be wide enough for its bodies."""
 LENGTH_TOLERANCE = 1e-6
 """Tolerance of the length of the quaternions of a start; rounding in single precision is smaller."""
 
@@ -72,29 +70,13 @@ class HardBodies(Pairwise):
         last = int(start[SHAPE.name].max(initial=0))
         shapes = self.shapes()
         must(last < len(shapes), "particles.shape", f"below {len(shapes)}, the shapes", last)
-        low, high = scene.domain.bounds()
-        if low is None or high is None or not len(lengths):
-            return
-        around, kinds = confinement(scene), start[SHAPE.name]
-        sizes = self.sizes(start)
-        scaled, space = (False, False, False), float(np.prod(high - low))
-        if around is not None:
+        around, sizes = confinement(scene), self.sizes(start)
+        if around is not None and len(sizes):
             container = around.container
-            scaled, space = container.scaled(), container.volume_in(high - low, self.unit_of(start))
-            equal = not any(scaled) or float(np.ptp(sizes)) <= LENGTH_TOLERANCE * float(sizes.max())
+            same = float(np.ptp(sizes)) <= LENGTH_TOLERANCE * float(sizes.max())
+            equal = same or not any(container.scaled())
             rule = f"in one ratio to their shapes, as the {container.kind()} grows with them"
             must(equal, "particles.radius", rule, float(sizes.max() / sizes.min()))
-        volume = float((np.array([one.volume() for one in shapes])[kinds] * sizes**3).sum())
-        joined, contracted = np.array(scene.domain.joined()), 3 - sum(scaled)
-        if not joined.any():
-            return
-        # At this density two bodies must not touch on both sides at once.
-        growth = (DENSEST_PACKING * space / volume) ** (1 / contracted)
-        side = float((high - low)[joined].min()) / growth
-        longest = 2 * float(start["radius"].max())
-        wide = f"at least {2 * longest:.4g} m wide at a packing fraction of {DENSEST_PACKING:g}"
-        rule = f"{wide}, twice the length of a body (take more bodies)"
-        must(side >= 2 * longest, "box", rule, side)
 
     def sizes(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the size of each body of a start over the size of its shape, shape (n,)."""

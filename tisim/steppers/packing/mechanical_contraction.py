@@ -27,7 +27,7 @@ from tisim.steppers.packing.overlaps import (
     RemovalRates,
     SumOverlaps,
 )
-from tisim.steppers.packing.space import PackingSpace
+from tisim.steppers.packing.space import CheckWidth, PackingSpace
 from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 from tisim.steppers.verlet import Advance
 
@@ -69,7 +69,7 @@ class MechanicalContraction(Stepper):
     returns to its last configuration without overlaps, and contracts by half the step. It ends in that
     configuration after ``halvings``.
 
-    The original method refers to rods. Overlaps of the start are removed first.
+    The original method is for rods. Overlaps of the start are removed first.
 
     Source: B16 chapters 2 and 3; S. R. Williams, A. P. Philipse, Phys. Rev. E 67 (2003) 051301.
     """
@@ -107,6 +107,9 @@ class MechanicalContraction(Stepper):
             rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
             packed = effect is bodies[0] or isinstance(effect, Confinement)
             must(packed, f"effects.{effect.label}", rule, effect.kind())
+        rods = all(shape.rod() for shape in bodies[0].shapes())
+        suited = rods or self.method != "original"
+        must(suited, "method", "'revised' for bodies that are not rods", self.method)
         low, _high = scene.domain.bounds()
         # A confinement checks the axes of its box.
         closed = low is not None and (all(scene.domain.imaged()) or confinement(scene) is not None)
@@ -146,7 +149,8 @@ class MechanicalContraction(Stepper):
             memory = rates.exported()
             items += [ScaleTwist(context, bodies), *sum_phases(rates, memory)]
             buffers.append(Buffer(memory, "removal rates between chunks", self.kind()))
-        motion = (BeginStep(context), MoveBodies(context, bodies, space), Advance(context))
+        moved = MoveBodies(context, bodies, space), CheckWidth(context)
+        motion = (BeginStep(context), *moved, Advance(context))
         return Step((*items, *motion), tuple(buffers))
 
 

@@ -3,6 +3,8 @@
 from tisim.backend.taichi import ti
 from tisim.effects.base import Confinement
 from tisim.numerics import elementary
+from tisim.program.phases import PerParticle
+from tisim.state.status import WorldStatus
 from tisim.steppers.context import StepContext
 
 
@@ -47,3 +49,19 @@ class PackingSpace:
                     # Exactly the same position if nothing has grown.
                     result[k] = place[k] + (growth - 1.0) * (place[k] - centre[k])
         return result
+
+
+class CheckWidth(PerParticle):
+    """This phase stops a world in which a body has become longer than half a periodic side: two bodies could
+    then touch at two images at once, and only the nearest is looked at."""
+
+    def __init__(self, context: StepContext) -> None:
+        super().__init__(context.s)
+        self.domain, self.joined = context.domain, context.domain.data.joined()
+
+    @ti.func
+    def run(self, w, i):
+        side = self.domain.side(w)
+        for k in ti.static(range(3)):
+            if ti.static(self.joined[k]) and 4.0 * self.s.radius[w, i] > side[k]:
+                self.s.fail(w, WorldStatus.BOX_TOO_NARROW, i)

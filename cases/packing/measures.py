@@ -1,0 +1,85 @@
+"""Measures of packings, and many packings as one batch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tisim import Result, Scene, run
+from tisim.accuracy import Quantity
+from tisim.analysis import Mean
+from tisim.analysis.packings.contact_numbers import contact_numbers
+from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
+from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.analysis.packings.packing_fractions import packing_fraction
+from tisim.cases.common.runs import sound
+from tisim.effects import Confinement
+from tisim.engine.batches import Progress
+
+CUTOFFS = (1e-8, 1e-5)
+"""Smallest and largest cut-off (D) from which contact numbers are extrapolated (B16 2.2.5)."""
+
+
+@dataclass(frozen=True)
+class Packing:
+    """A packing and its measures.
+
+    fraction : packing fraction. contacts : mean contact number. held : mean contact number of bodies that are
+    not rattlers. nematic : S of the axes z. cubatic : S4. attempts : of the run.
+    """
+
+    bodies: PackedBodies
+    fraction: float
+    contacts: float
+    held: float
+    nematic: float
+    cubatic: float
+    attempts: int
+
+
+def measured(result: Result) -> Packing:
+    """Return the packing at the end of a run."""
+    bodies = PackedBodies.from_result(result)
+    numbers = contact_numbers(bodies)
+    axes = bodies.axes()
+    return Packing(
+        bodies=bodies,
+        fraction=packing_fraction(bodies, volume_of(result)),
+        contacts=numbers.at_contact.value,
+        held=numbers.held_at_contact.value,
+        nematic=nematic_order(axes[:, 2]).order,
+        cubatic=cubatic_order(bodies).order,
+        attempts=int(result.work["steps"]),
+    )
+
+
+def volume_of(result: Result) -> float | None:
+    """Return the volume of the container (m^3); None for a periodic box."""
+    around = [one for one in result.scene.effects if isinstance(one, Confinement)]
+    if not around:
+        return None
+    bodies = PackedBodies.from_result(result)
+    side = bodies.high - bodies.low
+    return around[0].container.volume_in(side, float(bodies.diameters()[0]))
+
+
+def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[Packing]:
+    """Return the packings of scenes, packed as one batch; RunError if a run fails."""
+    return [measured(result) for result in sound(run(list(scenes), progress))]
+
+
+def grouped(scenes: Sequence[Sequence[Scene]], progress: Progress | None = None) -> list[list[Packing]]:
+    """Return the packings of groups of scenes, packed as one batch."""
+    found = iter(packings([one for group in scenes for one in group], progress))
+    return [[next(found) for _ in group] for group in scenes]
+
+
+def mean(group: Sequence[Packing], name: str) -> Mean:
+    """Return the mean of a measure over packings."""
+    return Mean.of([getattr(one, name) for one in group])
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities that 'tisim cost packing' compares."""
+    return (
+        Quantity("packing fraction", lambda result: measured(result).fraction, random=True),
+        Quantity("contact number", lambda result: measured(result).contacts, random=True),
+    )

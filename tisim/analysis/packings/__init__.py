@@ -1,0 +1,1 @@
+"""Measures of packings of bodies of any shape: contacts, order, pores."""
