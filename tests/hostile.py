@@ -130,8 +130,7 @@ def valid() -> tuple[dict[str, Any], ...]:
     for name, kind in _kinds(Stepper).items():
         fluid = {"temperature": 300.0, "viscosity": 1e-3} if name in ("brownian", "langevin") else {}
         control = {"control": controls[name]} if name in controls else {}
-        packed = kind.packs
-        more = {"effects": with_needed(HardRods), "domain": box} if packed else {}
+        more = {"effects": with_needed(HardRods), "domain": box} if kind.packs else {}
         tables_.append({**base.to_dict(), **more, "stepper": serialization.to_dict(kind(**fluid, **control))})
     return (
         *tables_,

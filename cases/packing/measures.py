@@ -14,12 +14,9 @@ from tisim.cases.common.runs import sound
 from tisim.effects import Confinement
 from tisim.engine.batches import Progress
 
-CUTOFFS = (1e-8, 1e-5)
-"""Smallest and largest cut-off (D) from which contact numbers are extrapolated (B16 2.2.5)."""
-
 
 @dataclass(frozen=True)
-class Packing:
+class MeasuredPacking:
     """A packing and its measures.
 
     fraction : packing fraction. contacts : mean contact number. held : mean contact number of bodies that are
@@ -35,12 +32,12 @@ class Packing:
     attempts: int
 
 
-def measured(result: Result) -> Packing:
+def measured(result: Result) -> MeasuredPacking:
     """Return the packing at the end of a run."""
     bodies = PackedBodies.from_result(result)
     numbers = contact_numbers(bodies)
     axes = bodies.axes()
-    return Packing(
+    return MeasuredPacking(
         bodies=bodies,
         fraction=packing_fraction(bodies, volume_of(result)),
         contacts=numbers.at_contact.value,
@@ -61,18 +58,20 @@ def volume_of(result: Result) -> float | None:
     return around[0].container.volume_in(side, float(bodies.diameters()[0]))
 
 
-def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[Packing]:
+def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[MeasuredPacking]:
     """Return the packings of scenes, packed as one batch; RunError if a run fails."""
     return [measured(result) for result in sound(run(list(scenes), progress))]
 
 
-def grouped(scenes: Sequence[Sequence[Scene]], progress: Progress | None = None) -> list[list[Packing]]:
+def grouped(
+    scenes: Sequence[Sequence[Scene]], progress: Progress | None = None
+) -> list[list[MeasuredPacking]]:
     """Return the packings of groups of scenes, packed as one batch."""
     found = iter(packings([one for group in scenes for one in group], progress))
     return [[next(found) for _ in group] for group in scenes]
 
 
-def mean(group: Sequence[Packing], name: str) -> Mean:
+def mean(group: Sequence[MeasuredPacking], name: str) -> Mean:
     """Return the mean of a measure over packings."""
     return Mean.of([getattr(one, name) for one in group])
 

@@ -62,6 +62,17 @@ def test_it_is_the_largest_disc_within_the_structure_that_contains_a_point(perio
     np.testing.assert_allclose(local_thickness(image, 1.0, periodic).ravel(), expected)
 
 
+def test_pixels_far_beyond_the_edges_count():
+    """A single hole in a large image: the largest disc touches four of its images, wherever the hole is."""
+    image = np.ones((50, 50), bool)
+    image[25, 25] = False
+    found = local_thickness(image, 1.0)
+    assert found.max() == pytest.approx(50 * np.sqrt(2), abs=1)
+    for shift in (3, 24):
+        moved = np.roll(image, (shift, -shift), (0, 1))
+        np.testing.assert_array_equal(local_thickness(moved, 1.0), np.roll(found, (shift, -shift), (0, 1)))
+
+
 def test_no_structure_and_nothing_else():
     assert (local_thickness(np.zeros((5, 5), bool), 1.0) == 0).all()
     assert np.isinf(local_thickness(np.ones((5, 5), bool), 1.0)).all()

@@ -83,6 +83,7 @@ from .packings.wall_alignment import DirectionHistogram as DirectionHistogram
 from .packings.wall_alignment import WallAlignment as WallAlignment
 from .packings.wall_alignment import direction_histogram as direction_histogram
 from .packings.wall_alignment import wall_alignment as wall_alignment
+from .packings.wall_alignment import wall_distances as wall_distances
 from .profiles import granular_temperature as granular_temperature
 from .profiles import layer_means as layer_means
 from .radial_distribution import radial_distribution as radial_distribution

@@ -23,7 +23,7 @@ REASONS: dict[int, str] = {
     WorldStatus.OUT_OF_CAPACITY: "more particles than the capacity",
     WorldStatus.CONTACT_OVERFLOW: "more simultaneous contacts than there is room for",
     WorldStatus.NOT_CONVERGED: "the iteration of a self-consistent quantity does not converge",
-    WorldStatus.OVERLAPPING: "overlaps of the start that were not removed; allow a longer duration",
+    WorldStatus.OVERLAPPING: "overlaps of the start were not removed; allow more time or a lower density",
     WorldStatus.BOX_TOO_NARROW: "bodies longer than half the periodic box; take more bodies",
     WorldStatus.POSITION_LOST: "a step so long or so fast that rounding loses the place in the box",
     WorldStatus.STEP_TOO_SHORT: "the implicit equations of a step cannot be solved even at the shortest step",

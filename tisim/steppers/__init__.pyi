@@ -18,6 +18,7 @@ from .implicit.step_control import (
 )
 from .implicit.trapezoid import Trapezoid as Trapezoid
 from .langevin import Langevin as Langevin
+from .packing.energy_minimisation import EnergyMinimisation as EnergyMinimisation
 from .packing.mechanical_contraction import MechanicalContraction as MechanicalContraction
 from .step_control import (
     ApproachTime as ApproachTime,

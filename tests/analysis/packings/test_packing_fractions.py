@@ -55,7 +55,7 @@ def test_a_sphere_at_a_wall():
     ball = SphereShape(diameter=2.0)
     packing = PackedBodies.of(ball, [[0, 0, 1.0]], (-1, -1, 0), (1, 1, 4), periodic=(True, True, False))
     edges = np.array([-1.0, 0.0, 0.5, 1.0, 2.0, 3.0])
-    found = fraction_profile(packing, Plane(), edges, points=100_000)
+    found = fraction_profile(packing, Plane().distances, edges, points=100_000)
     caps = np.pi * edges[1:5] ** 2 * (3 - edges[1:5]) / 3
     np.testing.assert_allclose(found.fraction[1:4], np.diff(caps) / (4 * np.diff(edges[1:5])), atol=0.01)
     assert np.isnan(found.fraction[0])
@@ -77,7 +77,7 @@ def test_one_file_of_rods_in_a_cylinder():
     found = sampled_fraction(packing, lambda r: np.hypot(r[:, 0], r[:, 1]) < 0.5, points=100_000)
     assert found.value == pytest.approx(expected, abs=1.5 * found.half)
     wall = CylindricalSurface(start=(0, 0, -3), end=(0, 0, 6), radius=0.5)
-    core = fraction_profile(packing, wall, np.array([0.3, 0.5]), points=100_000)
+    core = fraction_profile(packing, wall.distances, np.array([0.3, 0.5]), points=100_000)
     # Within 0.2 of the axis: a cylinder of length L with caps of a sphere of 0.5.
     cap = 2 * np.pi / 3 * (0.5**3 - (0.25 - 0.04) ** 1.5)
     filled = (np.pi * 0.04 * 2 + 2 * cap) / (np.pi * 0.04 * 3)
@@ -96,7 +96,7 @@ def test_wrong_regions_are_refused():
     with pytest.raises(InputError, match="points in the region must be at least 100; received 0"):
         sampled_fraction(packing, lambda r: r[:, 0] > 2)
     with pytest.raises(InputError, match="edges must be increasing distances"):
-        fraction_profile(packing, Plane(), np.array([1.0, 0.0]))
+        fraction_profile(packing, Plane().distances, np.array([1.0, 0.0]))
     empty = packing.where(np.zeros(1, bool))
     assert packing_fraction(empty) == 0
     assert (body_at(empty, np.zeros((3, 3))) == -1).all()

@@ -5,11 +5,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tisim import InputError
-from tisim.analysis import PackedBodies, direction_histogram, wall_alignment
+from tisim.analysis import PackedBodies, direction_histogram, wall_alignment, wall_distances
 from tisim.geometry import CylindricalSurface, Plane
 from tisim.shapes import SpherocylinderShape
 
 ROD = SpherocylinderShape(length=2e-3, diameter=1e-3)
+
+
+def alignment(packing, walls, **settings):
+    """Of shapes of tisim.geometry."""
+    return wall_alignment(packing, *wall_distances(packing.position, walls), **settings)
 
 
 def along(directions):
@@ -30,15 +35,15 @@ def test_rods_at_planes():
     box = (0, 0, 0), (10e-3, 10e-3, 10e-3)
     packing = PackedBodies.of(ROD, position, *box, along(directions), periodic=(False,) * 3)
     walls = Plane(), Plane(normal=(2.0, 0, 0))
-    found = wall_alignment(packing, walls)
+    found = alignment(packing, walls)
     assert found.near.tolist() == [4, 1]
     assert found.aligned.tolist() == [3, 0]
     assert found.fraction == pytest.approx(3 / 5)
     assert found.with_any == pytest.approx(3 / 4)
-    assert wall_alignment(packing, walls, angle=4.2).aligned.tolist() == [4, 0]
-    assert wall_alignment(packing, walls, within=0.6e-3).near.tolist() == [2, 1]
+    assert alignment(packing, walls, angle=4.2).aligned.tolist() == [4, 0]
+    assert alignment(packing, walls, within=0.6e-3).near.tolist() == [2, 1]
     # A wall elsewhere has no rods.
-    assert np.isnan(wall_alignment(packing, [Plane(point=(0, 0, -1.0))]).fraction)
+    assert np.isnan(alignment(packing, [Plane(point=(0, 0, -1.0))]).fraction)
 
 
 def test_rods_in_a_cylinder():
@@ -58,7 +63,10 @@ def test_rods_in_a_cylinder():
         periodic=(False, False, True),
     )
     wall = CylindricalSurface(start=(0, 0, -0.1), end=(0, 0, 0.1), radius=5e-3)
-    found = wall_alignment(packing, [wall])
+    distance, normal = wall_distances(position, [wall])
+    np.testing.assert_allclose(distance[:36, 0], 0.7e-3, rtol=1e-12)
+    np.testing.assert_allclose(np.abs((normal[:36, 0] * np.tile(radial, (3, 1))).sum(axis=1)), 1, rtol=1e-9)
+    found = alignment(packing, [wall])
     assert (found.near[0], found.aligned[0]) == (36, 24)
     # 5 degrees from the tangent plane is too much, in the plane any direction is aligned.
     tilted = np.cos(0.3) * upright + np.sin(0.3) * around
@@ -66,14 +74,14 @@ def test_rods_in_a_cylinder():
     packing = PackedBodies.of(
         ROD, position[:24], packing.low, packing.high, along(np.concatenate([tilted, out]))
     )
-    assert wall_alignment(packing, [wall]).aligned[0] == 12
+    assert alignment(packing, [wall]).aligned[0] == 12
 
 
 def test_random_rods_are_aligned_by_chance(rng):
     turns = Rotation.random(20_000, rng=rng).as_quat(scalar_first=True)
     position = rng.uniform(0, 1e-2, (20_000, 3))
     packing = PackedBodies.of(ROD, position, (0, 0, 0), (1e-2,) * 3, turns, periodic=(False,) * 3)
-    found = wall_alignment(packing, [Plane(), Plane(point=(0, 0, 1e-2), normal=(0, 0, -1))])
+    found = alignment(packing, [Plane(), Plane(point=(0, 0, 1e-2), normal=(0, 0, -1))])
     expected = np.sin(np.radians(4))
     deviation = np.sqrt(expected * (1 - expected) / found.near.sum())
     assert found.fraction == pytest.approx(expected, abs=3 * deviation)
@@ -109,8 +117,10 @@ def test_directions_are_in_their_bins():
 def test_wrong_arguments_are_refused(rng):
     packing = PackedBodies.of(ROD, [[0, 0, 0]], (0, 0, 0), (1, 1, 1))
     with pytest.raises(InputError, match="walls must be at least one; received 0"):
-        wall_alignment(packing, [])
+        alignment(packing, [])
     with pytest.raises(InputError, match="angle must be between 0 and 90 degrees; received 90"):
-        wall_alignment(packing, [Plane()], angle=90)
+        alignment(packing, [Plane()], angle=90)
+    with pytest.raises(InputError, match=r"distance, normal must be of shapes \(1, walls\) and"):
+        wall_alignment(packing, np.zeros((2, 1)), np.zeros((2, 1, 3)))
     with pytest.raises(InputError, match="bins must be two whole numbers, at least 1"):
         direction_histogram(packing.axes()[:, 2], (0, 3))

@@ -268,7 +268,7 @@ def test_orientations_of_a_start_are_random_unless_given():
 def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():
     result = run(scene(ROD, 100, 0.3, duration=3.0, method="original"))
     assert result.status.failed
-    assert "overlaps of the start that were not removed" in result.status.reason
+    assert "overlaps of the start were not removed" in result.status.reason
 
 
 def test_a_resumed_run_returns_to_its_last_configuration(tmp_path):

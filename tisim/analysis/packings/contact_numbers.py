@@ -47,12 +47,12 @@ def contact_numbers(
     """Return mean contact numbers of a packing: twice the number of pairs with a gap of at most a cut-off,
     over the number of bodies, for at least three cut-offs (in D). Pairs that overlap are in contact.
 
-    fewest : a body with fewer contacts with bodies that are not rattlers is a rattler. Four frictionless
-        contacts is the smallest number that can hold a sphere, and also the smallest that can hold a smooth
-        body of any other shape (by its curvature; otherwise one more than its degrees of freedom).
+    fewest : a body with fewer contacts with bodies that are not rattlers is a rattler. No fewer than four
+        frictionless contacts can hold a sphere, and four can hold a smooth body of another shape if its
+        curvature helps; without this it takes one more than it has degrees of freedom.
 
-    Source: B16 section 2.2.5; A. Wouterse, S. Luding, A. P. Philipse, Granular Matter 11 (2009) 169; for the
-    rule of four contacts A. Donev et al., Phys. Rev. E 75 (2007) 051304.
+    Source: B16 section 2.2.5, after A. Wouterse, S. R. Williams, A. P. Philipse, J. Phys.: Condens. Matter 19
+    (2007) 406215; for the rule of four contacts A. Donev et al., Phys. Rev. E 75 (2007) 051304.
     """
     cutoff = np.sort(np.asarray(cutoffs, float).ravel())
     rising = len(cutoff) > 2 and cutoff[0] >= 0 and bool((np.diff(cutoff) > 0).all())

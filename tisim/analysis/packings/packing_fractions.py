@@ -13,7 +13,6 @@ from scipy.stats import norm
 from tisim.analysis.flow_curves import Estimate
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.errors import is_whole, must
-from tisim.geometry.shape import Shape
 from tisim.numerics.statistics import CONFIDENCE
 
 POINTS = 200_000
@@ -111,18 +110,23 @@ def sampled_fraction(
 
 
 def fraction_profile(
-    packing: PackedBodies, surface: Shape, edges: np.ndarray, points: int = POINTS, seed: int = 0
+    packing: PackedBodies,
+    distance: Callable[[np.ndarray], np.ndarray],
+    edges: np.ndarray,
+    points: int = POINTS,
+    seed: int = 0,
 ) -> FractionProfile:
-    """Return the packing fraction in layers between distances (m, increasing) from a surface, such as a
-    ``Plane`` or a ``CylindricalSurface``.
+    """Return the packing fraction in layers between distances (m, increasing) from a wall.
 
-    Points behind a plane are at a negative distance. A cylinder has the same distances on both sides: take
-    the box within it or around it, or edges up to its radius.
+    distance : function of points (m, shape (m, 3)) that returns their distances from the wall, m, shape (m,),
+        such as ``Plane().distances``. It must be negative behind the wall, or infinite, if the box reaches
+        beyond: a ``CylindricalSurface`` has the same distances on both sides.
+    points : number of random points in the box. seed : of these points.
     """
     edges = np.asarray(edges, float)
     must(len(edges) > 1 and bool((np.diff(edges) > 0).all()), "edges", "increasing distances", edges)
     sample = _sample(packing, points, seed)
-    layer = np.searchsorted(edges, surface.distances(sample), side="right") - 1
+    layer = np.searchsorted(edges, distance(sample), side="right") - 1
     kept = (layer >= 0) & (layer < len(edges) - 1)
     layer, filled = layer[kept], body_at(packing, sample[kept]) >= 0
     number = np.bincount(layer, minlength=len(edges) - 1)

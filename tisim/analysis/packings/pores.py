@@ -61,9 +61,9 @@ def pore_sizes(packing: PackedBodies, spacing: float) -> PoreSizes:
     """Return the distribution of pore sizes: at each point of the pores, the diameter of the largest sphere
     that contains the point and no part of a body (``local_thickness`` of the pores).
 
-    spacing : side of a voxel, m. Diameters are right to about two voxels: in a cubic lattice of spheres of 40
-        or 41 voxels across the largest pore is 2.3 voxels too small or 1.0 too large, and the mean pore 0.52
-        or 0.59 of D.
+    spacing : side of a voxel, m. A diameter is right to about two voxels, and the mean is better: in a cubic
+        lattice of spheres of 10, 20 and 40 voxels across it is 0.49, 0.54 and 0.55 of D, with standard
+        deviations up to 0.03 for random places of the lattice among the voxels.
     Spheres may reach through the faces of a box that is periodic along all axes. Any other box is taken as if
     it were open along all axes, with free space beyond.
 

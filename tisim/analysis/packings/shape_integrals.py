@@ -42,7 +42,7 @@ def curvature_integral(shape: ParticleShape) -> float:
     """Return the integral M (m) of the mean curvature over the surface of a convex shape, 2 pi times its mean
     width: pi L + 2 pi D for a rod, and the integral of the support function over all directions for others.
 
-    Source: H. Hadwiger, Vorlesungen ueber Inhalt, Oberflaeche und Isoperimetrie (1957), section 6.1.
+    Source: H. Hadwiger, Vorlesungen ueber Inhalt, Oberflaeche und Isoperimetrie (1957).
     """
     if (rod := shape.rod()) is not None:
         half, radius = rod

@@ -31,7 +31,7 @@ def surface_correlation(packing: PackedBodies, edges: np.ndarray) -> np.ndarray:
 
     The packing must be periodic along all axes.
 
-    Source: L. A. Santalo, Integral Geometry and Geometric Probability (1976), section 15.3, for W.
+    Source: A. Isihara, J. Chem. Phys. 18 (1950) 1446, for W at contact, and Steiner's formula for a gap.
     """
     edges = np.asarray(edges, float)
     rising = len(edges) > 1 and edges[0] >= 0 and all(a < b for a, b in pairwise(edges))

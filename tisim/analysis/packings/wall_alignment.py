@@ -14,8 +14,8 @@ from tisim.geometry.shape import Shape
 
 LARGEST_ANGLE = 4.0
 """Angle between a rod and a wall up to which it is aligned, degrees (B16 Fig. 2.6)."""
-GRADIENT_STEP = 1e-5
-"""Step of the difference that gives the normal of a wall, relative to D."""
+GRADIENT_STEP = 1e-6
+"""Step of the difference that gives the normal of a wall, relative to the extent of the places."""
 
 
 class WallAlignment(NamedTuple):
@@ -49,51 +49,57 @@ class DirectionHistogram(NamedTuple):
 
 def wall_alignment(
     packing: PackedBodies,
-    walls: Sequence[Shape],
+    distance: np.ndarray,
+    normal: np.ndarray,
     within: float | None = None,
     angle: float = LARGEST_ANGLE,
 ) -> WallAlignment:
     """Return how many rods near walls are aligned with them: their axis z is at most ``angle`` (degrees) from
     the plane that touches the wall at its point nearest to the centre of the rod.
 
-    walls : surfaces with distances, such as ``Plane`` and ``CylindricalSurface``.
-    within : largest distance (m) of a centre from a wall at which a rod is near; D of each rod by default.
+    distance, normal : distances of the centres of the rods from each wall, m, shape (n, walls), and the unit
+        normals of the walls at their nearest points, of either sign, shape (n, walls, 3): both from
+        ``wall_distances`` of planes, cylinders and other shapes.
+    within : largest distance (m) at which a rod is near to a wall; D of each rod by default.
 
     Rods at random directions would be aligned to sin(angle), 7 % at 4 degrees; rods that touch a wall cannot
     point away from it, and of these more are.
 
     Source: B16 section 2.2.5, Fig. 2.6.
     """
-    must(len(walls) > 0, "walls", "at least one", len(walls))
+    distance, normal = np.asarray(distance, float), np.asarray(normal, float)
+    number = len(packing)
+    fit = distance.ndim == 2 and len(distance) == number and normal.shape == (*distance.shape, 3)
+    rule = f"of shapes ({number}, walls) and ({number}, walls, 3)"
+    must(fit and distance.shape[1] > 0, "distance, normal", rule, (distance.shape, normal.shape))
     must(0 < angle < 90, "angle", "between 0 and 90 degrees", angle)
     must(within is None or within > 0, "within", "above 0", within)
-    limit = packing.diameters() if within is None else np.full(len(packing), within)
-    axes = packing.axes()[:, 2]
-    near, aligned = np.zeros((2, len(walls), len(packing)), bool)
-    for k, wall in enumerate(walls):
-        near[k] = wall.distances(packing.position) <= limit
-        normal = _normals(wall, packing.position, GRADIENT_STEP * limit)
-        lies = np.abs((axes * normal).sum(axis=1)) <= np.sin(np.radians(angle))
-        aligned[k] = near[k] & lies
-    ones, either = near.sum(axis=1), int(near.any(axis=0).sum())
+    near = distance <= (packing.diameters()[:, None] if within is None else within)
+    out = np.abs(np.einsum("na,nwa->nw", packing.axes()[:, 2], normal))
+    aligned = near & (out <= np.sin(np.radians(angle)))
+    all_near, either = int(near.sum()), int(near.any(axis=1).sum())
     return WallAlignment(
-        ones,
-        aligned.sum(axis=1),
-        float(aligned.sum() / ones.sum()) if either else float("nan"),
-        float(aligned.any(axis=0).sum() / either) if either else float("nan"),
+        near.sum(axis=0),
+        aligned.sum(axis=0),
+        float(aligned.sum() / all_near) if all_near else float("nan"),
+        float(aligned.any(axis=1).sum() / either) if either else float("nan"),
     )
 
 
-def _normals(wall: Shape, places: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return unit normals of a wall at its points nearest to places (m), from central differences of the
-    distance over ``step`` (m)."""
-    sides = [
-        wall.distances(places + step[:, None] * e) - wall.distances(places - step[:, None] * e)
-        for e in np.eye(3)
-    ]
-    gradient = np.stack(sides, axis=1)
-    size = np.linalg.norm(gradient, axis=1, keepdims=True)
-    return np.asarray(gradient / np.where(size > 0, size, 1.0))
+def wall_distances(places: np.ndarray, walls: Sequence[Shape]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distances (m) of places (m, shape (n, 3)) from walls such as ``Plane`` and
+    ``CylindricalSurface``, shape (n, walls), and the unit normals of the walls at their nearest points, shape
+    (n, walls, 3), from differences of the distance."""
+    must(len(walls) > 0, "walls", "at least one", len(walls))
+    places = np.asarray(places, float)
+    step = GRADIENT_STEP * float(np.ptp(places, axis=0).max(initial=0.0)) or GRADIENT_STEP
+    distance = np.stack([wall.distances(places) for wall in walls], axis=1)
+    normal = np.zeros((*distance.shape, 3))
+    for k, wall in enumerate(walls):
+        for axis, e in enumerate(np.eye(3)):
+            normal[:, k, axis] = wall.distances(places + step * e) - wall.distances(places - step * e)
+    size = np.linalg.norm(normal, axis=2, keepdims=True)
+    return distance, normal / np.where(size > 0, size, 1.0)
 
 
 def direction_histogram(

@@ -7,17 +7,13 @@ from typing import Any, ClassVar, Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option, parameter
-from tisim.effects.base import Confinement, Effect, HardBodies, SceneParts
-from tisim.effects.base.confinement import confinement
+from tisim.effects.base import Effect, HardBodies, SceneParts
 from tisim.errors import must
-from tisim.numerics import elementary
-from tisim.numerics.vectors import product
 from tisim.pairs.listed_pairs import sum_phases
 from tisim.program.phases import PerParticle, Phase
 from tisim.state.fields import Field, WorldField
 from tisim.state.status import WorldStatus
-from tisim.steppers.base import Stepper
-from tisim.steppers.common import BeginStep, apply_displacement
+from tisim.steppers.common import BeginStep
 from tisim.steppers.context import Buffer, Step, StepContext
 from tisim.steppers.packing.overlaps import (
     INVERSE_OVERLAP,
@@ -27,28 +23,21 @@ from tisim.steppers.packing.overlaps import (
     RemovalRates,
     SumOverlaps,
 )
+from tisim.steppers.packing.packing_stepper import (
+    ACCEPTED_FIELDS,
+    CONTRACT,
+    MOVE,
+    PACKING_FIELDS,
+    RETURN,
+    BeginAttempt,
+    MoveBodies,
+    PackingStepper,
+)
 from tisim.steppers.packing.space import CheckWidth, PackingSpace
-from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 from tisim.steppers.verlet import Advance
 
-ACCEPTED_FIELDS = (
-    Field("accepted_position", "m", 3, "keep", default="position"),
-    Field("accepted_orientation", "", 1, "keep", slots=4),
-    Field("accepted_radius", "m", 1, "keep", default="radius"),
-)
-"""The last configuration without overlaps; part of checkpoints, because a run may return to it."""
-MOVE, CONTRACT, RETURN = 0, 1, 2
-"""What a step does: remove overlaps, contract a configuration without overlaps, or return to the last one."""
 
-
-class Attempts(FixedStep):
-    """A step is one attempt to remove the overlaps of a packing, and takes a time without physical
-    meaning."""
-
-    dt: float = parameter("s", "time of an attempt", 1.0, ge=SHORTEST_STEP)
-
-
-class MechanicalContraction(Stepper):
+class MechanicalContraction(PackingStepper):
     """Mechanical contraction packs hard bodies: it contracts the system until overlaps remain.
 
     After each small contraction it tries to remove the overlaps by moving and turning bodies:
@@ -65,16 +54,15 @@ class MechanicalContraction(Stepper):
     One step is one attempt to remove all overlaps; it takes the time ``dt`` of the control, so the duration
     of a run is the largest number of attempts. The box keeps its size and the bodies grow, which is the same
     as a contracting box up to the scale of all lengths. A cylinder or a wedge grows with the bodies, except
-    along its periodic axis. If overlaps remain after ``attempts``, the world
-    returns to its last configuration without overlaps, and contracts by half the step. It ends in that
-    configuration after ``halvings``.
+    along its periodic axis. If overlaps remain after ``attempts``, the world returns to its last
+    configuration without overlaps, and contracts by half the step. It ends in that configuration after
+    ``halvings``.
 
     The original method is for rods. Overlaps of the start are removed first.
 
     Source: B16 chapters 2 and 3; S. R. Williams, A. P. Philipse, Phys. Rev. E 67 (2003) 051301.
     """
 
-    control: Attempts = option("time of an attempt", Attempts())
     method: Literal["revised", "original"] = option("the way in which bodies are moved", "revised")
     volume_step: float = parameter("D^3", "first step by which the volume decreases", 0.1, gt=0)
     halvings: int = option("how often the step of the volume is halved before a world ends", 4, ge=0)
@@ -86,38 +74,19 @@ class MechanicalContraction(Stepper):
         "D^2", "xi over the moment of inertia of a body of mass 1, of the original method", 1.0, gt=0
     )
 
-    packs: ClassVar = True
     world_fields: ClassVar = (
-        WorldField("overlapping", "sum"),
+        *PACKING_FIELDS,
         WorldField("contractions", "counter"),
-        WorldField("attempted", "integer"),
         WorldField("halved", "integer"),
-        WorldField("packing_action", "integer"),
         WorldField("box_volume", "real"),
         WorldField("volume_decrease", "real"),
-        WorldField("growth", "real"),
     )
 
     def check(self, scene: SceneParts) -> None:
         super().check(scene)
-        bodies = [effect for effect in scene.effects if isinstance(effect, HardBodies)]
-        must(len(bodies) == 1, "effects", f"one with hard bodies for {self.kind()}, such as hard_rods",
-             [effect.label for effect in scene.effects])  # fmt: skip
-        for effect in scene.effects:
-            rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
-            packed = effect is bodies[0] or isinstance(effect, Confinement)
-            must(packed, f"effects.{effect.label}", rule, effect.kind())
-        rods = all(shape.rod() for shape in bodies[0].shapes())
-        suited = rods or self.method != "original"
+        (bodies,) = (effect for effect in scene.effects if isinstance(effect, HardBodies))
+        suited = self.method != "original" or all(shape.rod() for shape in bodies.shapes())
         must(suited, "method", "'revised' for bodies that are not rods", self.method)
-        low, _high = scene.domain.bounds()
-        # A confinement checks the axes of its box.
-        closed = low is not None and (all(scene.domain.imaged()) or confinement(scene) is not None)
-        rule = f"a periodic box for {self.kind()}, or one with an effect confinement"
-        must(closed, "domain", rule, scene.domain.kind())
-
-    def independent(self, effects: Sequence[Effect]) -> bool:
-        return False
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
         return (
@@ -149,20 +118,8 @@ class MechanicalContraction(Stepper):
             memory = rates.exported()
             items += [ScaleTwist(context, bodies), *sum_phases(rates, memory)]
             buffers.append(Buffer(memory, "removal rates between chunks", self.kind()))
-        moved = MoveBodies(context, bodies, space), CheckWidth(context)
-        motion = (BeginStep(context), *moved, Advance(context))
-        return Step((*items, *motion), tuple(buffers))
-
-
-class BeginAttempt(Phase):
-    """This phase resets the number of bodies with overlaps."""
-
-    def __init__(self, context: StepContext) -> None:
-        self.s = context.s
-
-    @ti.func
-    def run(self, w, _k):
-        self.s.overlapping[w] = 0
+        items += [BeginStep(context), RemoveOverlaps(context, bodies), CheckWidth(context), Advance(context)]
+        return Step(tuple(items), tuple(buffers))
 
 
 class ChooseAction(Phase):
@@ -223,42 +180,8 @@ class ScaleTwist(PerParticle):
         s.overlap_twist[w, i] = s.overlap_twist[w, i] / (self.stepper.inertia(w) * moment)
 
 
-class MoveBodies(PerParticle):
-    """This phase moves and turns each body, or puts it back to the last configuration without overlaps, and
-    lets it grow."""
-
-    def __init__(self, context: StepContext, bodies: Any, space: PackingSpace) -> None:
-        super().__init__(context.s)
-        self.stepper, self.bodies, self.domain = context.stepper, bodies, context.domain
-        self.space = space
-
-    @ti.func
-    def run(self, w, i):
-        s = self.s
-        before, radius, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
-        place, far = before, ti.cast(0.0, s.real)
-        if s.packing_action[w] == MOVE:
-            shift, turn = self.motion(w, i)
-            place = before + shift
-            self.rotate(w, i, turn)
-            far = turn.norm() * radius
-        elif s.packing_action[w] == CONTRACT:
-            s.accepted_position[w, i], s.accepted_radius[w, i] = before, radius
-            for k in ti.static(range(4)):
-                s.accepted_orientation[w, i, k] = s.orientation[w, i, k]
-        else:
-            place = s.accepted_position[w, i]
-            for k in ti.static(range(4)):
-                s.orientation[w, i, k] = s.accepted_orientation[w, i, k]
-            s.radius[w, i] = s.accepted_radius[w, i]
-            # Lists are rebuilt, whatever has changed since.
-            far = 2.0 * radius
-        growth = ti.cast(s.growth[w], s.real)
-        s.radius[w, i] = s.radius[w, i] * growth
-        place = self.space.grown(w, place, growth)
-        grown = ti.cast(s.radius[w, i] - radius, ti.f64) + ti.cast(far, ti.f64)
-        path = self.domain.nearest(w, before, place, end)
-        apply_displacement(s, self.domain, w, i, place, ti.cast(path, ti.f64), grown, end)
+class RemoveOverlaps(MoveBodies):
+    """This phase moves each body out of its overlaps."""
 
     @ti.func
     def motion(self, w, i):
@@ -279,15 +202,3 @@ class MoveBodies(PerParticle):
                     part = self.stepper.fraction(w) / s.removal_rate[w, i]
                     shift, turn = part * push, part / size * twist
         return shift, turn
-
-    @ti.func
-    def rotate(self, w, i, turn):
-        """Turn a body by a rotation vector (rad)."""
-        s, angle = self.s, turn.norm()
-        if angle > 0.0:
-            half = 0.5 * angle
-            u = elementary.sin(half) / angle * turn
-            q = product(ti.Vector([elementary.cos(half), u[0], u[1], u[2]]), self.bodies.turn(s, w, i))
-            q = q / q.norm()
-            for k in ti.static(range(4)):
-                s.orientation[w, i, k] = q[k]

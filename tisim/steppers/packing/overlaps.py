@@ -17,6 +17,11 @@ OVERLAP_TWIST = Field("overlap_twist", "", 3, "keep", scratch=True)
 """Sum of the moments of these normals, with arms in units of D."""
 INVERSE_OVERLAP = Field("inverse_overlap", "1/m", 1, "keep", scratch=True)
 """1 over the smallest overlap of a body; 0 for a body without overlaps."""
+OVERLAP_ENERGY = Field("overlap_energy", "", 1, "keep", scratch=True)
+"""Half the energy of the overlaps of a body with others, and the energy of those with walls, in units of
+their stiffness times D^2."""
+DEEPEST_OVERLAP = Field("deepest_overlap", "", 1, "keep", scratch=True)
+"""The deepest overlap of a body, in D."""
 REMOVAL_RATE = Field("removal_rate", "1/s", 1, "keep", scratch=True)
 """Largest speed at which the motion of a body removes an overlap, over the overlap."""
 
@@ -201,3 +206,74 @@ class RemovalRates(BodySum):
     @ti.func
     def finish_body(self, w, i, total):
         self.write_sum(w, i, total)
+
+
+class SumSoftOverlaps(BodySum):
+    """This sum sets force, torque and energy of bodies that repel each other by harmonic springs.
+
+    The energy of a pair is (delta_ij/D_ij)^2 / 2, with the overlap delta_ij and the mean D_ij of both D. The
+    force on a body is its derivative by the displacement in D of the body: (delta_ij/D_ij) D_i/D_ij along the
+    normal; it acts on the point of contact, because moving a point of contact along its surface does not
+    change the overlap to first order.
+    """
+
+    components = 8
+
+    def together(self, laws: tuple[Any, ...]) -> ListedLaws:
+        return ListedLaws(laws, 16, False)
+
+    @ti.func
+    def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
+        s = self.s
+        gap, normal, here, there = self.bodies.closest(s, w, i, j, separation)
+        size_i = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
+        size_j = self.bodies.size(s, w, j) * self.bodies.unit(w, 0)
+        mean = 0.5 * (size_i + size_j)
+        depth = ti.max(-gap, 0.0) / mean
+        force_i, force_j = -depth * size_i / mean * normal, depth * size_j / mean * normal
+        turn_i, turn_j = (here / size_i).cross(force_i), (there / size_j).cross(force_j)
+        values = ti.Vector.zero(s.real, 16)
+        for k in ti.static(range(3)):
+            values[k], values[3 + k] = force_i[k], turn_i[k]
+            values[8 + k], values[11 + k] = force_j[k], turn_j[k]
+        for k in ti.static((0, 8)):
+            values[k + 6], values[k + 7] = 0.25 * depth * depth, depth
+        return values
+
+    @ti.func
+    def pair_contributions(self, values):
+        return piece(values, 0, 8), piece(values, 8, 8)
+
+    @ti.func
+    def combine(self, a, b):
+        total = a + b
+        total[7] = ti.max(a[7], b[7])
+        return total
+
+    @ti.func
+    def write_sum(self, w, i, total):
+        s = self.s
+        for k in ti.static(range(3)):
+            s.overlap_push[w, i][k], s.overlap_twist[w, i][k] = total[k], total[3 + k]
+        s.overlap_energy[w, i], s.deepest_overlap[w, i] = total[6], total[7]
+
+    @ti.func
+    def read_sum(self, w, i):
+        s = self.s
+        push, twist, energy = s.overlap_push[w, i], s.overlap_twist[w, i], s.overlap_energy[w, i]
+        deepest = s.deepest_overlap[w, i]
+        return ti.Vector([push[0], push[1], push[2], twist[0], twist[1], twist[2], energy, deepest])
+
+    @ti.func
+    def wall_term(self, w, i, depth, counts, normal, here):
+        size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
+        deep = ti.max(depth, 0.0) / size
+        force = -deep * normal
+        turn = here.cross(force)
+        return ti.Vector([force[0], force[1], force[2], turn[0], turn[1], turn[2], 0.5 * deep * deep, deep])
+
+    @ti.func
+    def finish_body(self, w, i, total):
+        self.write_sum(w, i, total)
+        if total[7] > self.stepper.tolerance(w):
+            ti.atomic_add(self.s.overlapping[w], ti.i64(1))

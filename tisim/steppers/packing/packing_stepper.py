@@ -1,0 +1,148 @@
+"""The common part of the steppers that pack hard bodies: their attempts, and the last configuration without
+overlaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.component import option, parameter
+from tisim.effects.base import Confinement, Effect, HardBodies, SceneParts
+from tisim.effects.base.confinement import confinement
+from tisim.errors import must
+from tisim.numerics import elementary
+from tisim.numerics.vectors import product
+from tisim.program.phases import PerParticle, Phase
+from tisim.state.fields import Field, WorldField
+from tisim.steppers.base import Stepper
+from tisim.steppers.common import apply_displacement
+from tisim.steppers.context import StepContext
+from tisim.steppers.packing.space import PackingSpace
+from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
+
+ACCEPTED_FIELDS = (
+    Field("accepted_position", "m", 3, "keep", default="position"),
+    Field("accepted_orientation", "", 1, "keep", slots=4),
+    Field("accepted_radius", "m", 1, "keep", default="radius"),
+)
+"""The last configuration without overlaps; part of checkpoints, because a run may return to it."""
+PACKING_FIELDS = (
+    WorldField("overlapping", "sum"),
+    WorldField("attempted", "integer"),
+    WorldField("packing_action", "integer"),
+    WorldField("growth", "real"),
+)
+"""The number of bodies with overlaps, the attempts to remove them, the action of the step, and the factor by
+which it enlarges the bodies."""
+MOVE, CONTRACT, RETURN = 0, 1, 2
+"""What a step does: remove overlaps, contract a configuration without overlaps, or return to the last one."""
+
+
+class Attempts(FixedStep):
+    """A step is one attempt to remove the overlaps of a packing, and takes a time without physical
+    meaning."""
+
+    dt: float = parameter("s", "time of an attempt", 1.0, ge=SHORTEST_STEP)
+
+
+class PackingStepper(Stepper):
+    """Packing steppers bring hard bodies together in a periodic box of constant size: the bodies grow.
+
+    The phases of a step end with ``BeginStep``, a subclass of ``MoveBodies``, ``CheckWidth`` and ``Advance``.
+    Before these, a step sets ``packing_action`` and ``growth`` of the world.
+    """
+
+    contract: ClassVar[bool] = True
+    packs: ClassVar = True
+    control: Attempts = option("time of an attempt", Attempts())
+
+    def check(self, scene: SceneParts) -> None:
+        super().check(scene)
+        bodies = [effect for effect in scene.effects if isinstance(effect, HardBodies)]
+        must(len(bodies) == 1, "effects", f"one with hard bodies for {self.kind()}, such as hard_rods",
+             [effect.label for effect in scene.effects])  # fmt: skip
+        for effect in scene.effects:
+            rule = f"hard bodies alone, as {self.kind()} moves particles without forces"
+            packed = effect is bodies[0] or isinstance(effect, Confinement)
+            must(packed, f"effects.{effect.label}", rule, effect.kind())
+        low, _high = scene.domain.bounds()
+        # A confinement checks the axes of its box.
+        closed = low is not None and (all(scene.domain.imaged()) or confinement(scene) is not None)
+        rule = f"a periodic box for {self.kind()}, or one with an effect confinement"
+        must(closed, "domain", rule, scene.domain.kind())
+
+    def independent(self, effects: Sequence[Effect]) -> bool:
+        return False
+
+
+class BeginAttempt(Phase):
+    """This phase resets the number of bodies with overlaps."""
+
+    def __init__(self, context: StepContext) -> None:
+        self.s = context.s
+
+    @ti.func
+    def run(self, w, _k):
+        self.s.overlapping[w] = 0
+
+
+class MoveBodies(PerParticle):
+    """This phase moves and turns each body, or puts it back to the last configuration without overlaps, and
+    lets it grow. A subclass defines ``motion``."""
+
+    def __init__(self, context: StepContext, bodies: Any) -> None:
+        super().__init__(context.s)
+        self.stepper, self.bodies, self.domain = context.stepper, bodies, context.domain
+        self.space = PackingSpace(context)
+
+    @ti.func
+    def run(self, w, i):
+        s = self.s
+        before, radius, end = s.position[w, i], s.radius[w, i], s.time[w] + s.dt[w]
+        place, far = before, ti.cast(0.0, s.real)
+        if s.packing_action[w] == MOVE:
+            shift, turn = self.motion(w, i)
+            place = before + shift
+            self.rotate(w, i, turn)
+            far = turn.norm() * radius
+        elif s.packing_action[w] == CONTRACT:
+            s.accepted_position[w, i], s.accepted_radius[w, i] = before, radius
+            for k in ti.static(range(4)):
+                s.accepted_orientation[w, i, k] = s.orientation[w, i, k]
+            self.rest(w, i)
+        else:
+            place = s.accepted_position[w, i]
+            for k in ti.static(range(4)):
+                s.orientation[w, i, k] = s.accepted_orientation[w, i, k]
+            s.radius[w, i] = s.accepted_radius[w, i]
+            self.rest(w, i)
+            # Lists are rebuilt, whatever has changed since.
+            far = 2.0 * radius
+        growth = ti.cast(s.growth[w], s.real)
+        s.radius[w, i] = s.radius[w, i] * growth
+        place = self.space.grown(w, place, growth)
+        grown = ti.cast(s.radius[w, i] - radius, ti.f64) + ti.cast(far, ti.f64)
+        path = self.domain.nearest(w, before, place, end)
+        apply_displacement(s, self.domain, w, i, place, ti.cast(path, ti.f64), grown, end)
+
+    @ti.func
+    def motion(self, w, i):
+        """Return the displacement (m) and the rotation vector (rad) of a body."""
+        return 0.0 * self.s.position[w, i], 0.0 * self.s.position[w, i]
+
+    @ti.func
+    def rest(self, w, i):
+        """Stop a body, in a step that does not move it."""
+
+    @ti.func
+    def rotate(self, w, i, turn):
+        """Turn a body by a rotation vector (rad)."""
+        s, angle = self.s, turn.norm()
+        if angle > 0.0:
+            half = 0.5 * angle
+            u = elementary.sin(half) / angle * turn
+            q = product(ti.Vector([elementary.cos(half), u[0], u[1], u[2]]), self.bodies.turn(s, w, i))
+            q = q / q.norm()
+            for k in ti.static(range(4)):
+                s.orientation[w, i, k] = q[k]
