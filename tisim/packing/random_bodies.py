@@ -19,7 +19,7 @@ MOST_TRIED = 200_000_000
 """Largest number of places that are tried for a start, of which a narrow container has few inside."""
 MOST_TAKEN = 20_000
 """Largest number of places inside, one after the other, that are tried for a body."""
-MOST_STEPS = 30
+GILBERT_STEPS = 30
 """Steps of Gilbert's method, after which bodies that are not proved to be apart count as overlapping."""
 PARALLEL = 1e-12
 """Squared sine of the angle below which rods count as parallel."""
@@ -140,7 +140,7 @@ def proved_apart(shape: ParticleShape, apart: np.ndarray, turn: Rotation, turns:
     Source: E. G. Gilbert, SIAM J. Control 4 (1966) 61.
     """
     nearest, proved = apart.copy(), np.zeros(len(apart), bool)
-    for _ in range(MOST_STEPS):
+    for _ in range(GILBERT_STEPS):
         length = np.linalg.norm(nearest, axis=1)
         normal = nearest / np.where(length > 0, length, 1.0)[:, None]
         normal[length == 0] = [0.0, 0.0, 1.0]
