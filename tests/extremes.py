@@ -46,7 +46,7 @@ from tisim.effects.magnetic.moment import MOMENT
 from tisim.engine.assembly import needed_fields
 from tisim.packing.clump import clump_columns, sphere_columns
 from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Source
-from tisim.steppers.packing.mechanical_contraction import Attempts
+from tisim.steppers.packing.packing_stepper import Attempts
 
 MAGNITUDES = (
     5e-324, 2.3e-308, 1e-300, 1e-155, 1e-100, 1e-60, 1e-30, 1e-15, 1e-9, 1e-3, 0.5, math.nextafter(1.0, 0.0),

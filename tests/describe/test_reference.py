@@ -137,7 +137,8 @@ def test_needs_of_parts():
 
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(
-        InputError, match=r"^effect must be one of .*\bagglomeration, .*walls, \w+; received 'xyzzy'$"
+        InputError,
+        match=r"^effect must be one of .*\bagglomeration, .*walls, wedge_container, \w+; received 'xyzzy'$",
     ):
         reference.find("xyzzy")
     with pytest.raises(InputError, match=r"received 'mei'; did you mean 'mie'\?$"):

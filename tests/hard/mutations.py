@@ -94,7 +94,7 @@ SOFT_GRAINS = {
     "confinement": (
         "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
         "tests/steppers/packing/test_confinement.py::"
-        "test_an_attempt_equals_its_reference[exact-cylindrical_container]",
+        "test_an_attempt_equals_its_reference[spherocylinder_shape-cylindrical_container-exact]",
     ),
     "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{LAWS}[contact]"),
     "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{LAWS}[hertz]"),

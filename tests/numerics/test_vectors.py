@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
-from tisim.numerics.vectors import normal_to, product, rotated, rotation_matrix, turn_between
+from tisim.numerics.vectors import normal_to, orientation_of, product, rotated, rotation_matrix, turn_between
 
 Array = ti.types.ndarray()
 
@@ -45,6 +45,15 @@ def _between(a: Array, b: Array, turn: Array, normal: Array):
             normal[m, k] = n[k]
 
 
+@in_taichi_thread
+@ti.kernel
+def _axes(x: Array, z: Array, turn: Array):
+    for m in range(x.shape[0]):
+        q = orientation_of(_read(x, m, 3), _read(z, m, 3))
+        for k in ti.static(range(4)):
+            turn[m, k] = q[k]
+
+
 def unit(v):
     return v / np.linalg.norm(v, axis=1)[:, None]
 
@@ -79,3 +88,15 @@ def test_the_smallest_rotation_between_two_vectors_is_about_their_common_normal(
     np.testing.assert_allclose(2 * np.arccos(turn[4000:, 0]), angle, atol=1e-7)
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, rtol=1e-14)
     np.testing.assert_allclose((normal * a).sum(axis=1), 0, atol=1e-15)
+
+
+def test_an_orientation_is_given_by_two_axes(rng):
+    """Also along the coordinate axes, where half of the turns are by 180 degrees."""
+    frames = Rotation.random(1000, rng=rng).as_matrix()
+    frames[:24] = Rotation.create_group("O").as_matrix().round()
+    turn = np.zeros((1000, 4))
+    x, z = np.ascontiguousarray(frames[:, :, 0]), np.ascontiguousarray(frames[:, :, 2])
+    _axes(x, z, turn)
+    np.testing.assert_allclose(np.linalg.norm(turn, axis=1), 1, rtol=1e-14)
+    found = Rotation.from_quat(turn, scalar_first=True).as_matrix()
+    np.testing.assert_allclose(found, frames, rtol=0, atol=1e-14)

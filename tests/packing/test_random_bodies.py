@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import ks_2samp
 
+from tests.steppers.packing.test_mechanical_contraction import contact
 from tisim import InputError
 from tisim.geometry import BoxContainer, CylindricalContainer, SphericalContainer, WedgeContainer
 from tisim.packing import random_bodies, wall_gaps
@@ -98,10 +99,19 @@ def test_bodies_of_a_start_do_not_overlap(shape, container):
     assert -1e-12 < min(least) < 0.3 * radius
 
 
-def test_bodies_without_round_ends_are_kept_apart_by_their_bounding_spheres():
-    start, reach = random_bodies(SUPERQUADRIC, 100, 0.02, CUBE), 2 * SUPERQUADRIC.bounding_radius()
-    apart = np.linalg.norm(start.position[:, None] - start.position[None], axis=2)
-    assert apart[~np.eye(100, dtype=bool)].min() >= reach
+@pytest.mark.parametrize("shape", [ELLIPSOID, SUPERQUADRIC], ids=lambda one: one.kind())
+def test_superquadrics_of_a_start_do_not_overlap(shape):
+    """By their kernel. Bounding spheres overlap, so these are not all that keeps bodies apart."""
+    start = random_bodies(shape, 100, 0.15)
+    turns, side = Rotation.from_quat(start.orientation, scalar_first=True), np.array(start.box.high)
+    gaps = []
+    for i in range(100):
+        apart = start.position[:i] - start.position[i]
+        apart -= side * np.round(apart / side)
+        near = np.flatnonzero(np.linalg.norm(apart, axis=1) < 2 * shape.bounding_radius())
+        gaps += [-contact(shape, apart[j], turns[i], turns[j])[0] for j in near]
+    assert len(gaps) > 50
+    assert min(gaps) > -1e-12
 
 
 def test_a_start_depends_on_its_seed_alone():
@@ -121,8 +131,10 @@ def test_spheres_fill_a_cylinder_of_their_own_diameter():
 
 def test_wrong_starts_are_refused(monkeypatch):
     monkeypatch.setattr(random_bodies_module, "MOST_TRIED", 1_000_000)
+    monkeypatch.setattr(random_bodies_module, "MOST_TAKEN", 1000)
     narrow = CylindricalContainer(diameter=1.001)
     for given, message in (
+        ((ROD, 50, 0.5), "fraction must be one at which 50 bodies find places at random; received 0.5, with"),
         ((ROD, 0, 0.1), "number must be a whole number, at least 1"),
         ((ROD, 10, 1.0), "fraction must be between 0 and 1"),
         (

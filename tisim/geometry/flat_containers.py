@@ -14,8 +14,8 @@ from tisim.components.component import Vector, option, parameter
 from tisim.errors import must
 from tisim.geometry.container import Axes, Container
 
-BOTTOM, SLOPE, BACK = 0, 1, 2
-"""The walls of a wedge."""
+SLOPE_PLANE, BACK_PLANE = 1, 2
+"""Walls of a wedge; wall 0 is the bottom."""
 
 
 class WedgeContainer(Container):
@@ -25,8 +25,8 @@ class WedgeContainer(Container):
     h_w = l_w tan(angle) keep their ratios to D, and only the width w_w along z decreases in a contraction.
     The shortest wedge that holds rods of length L and radius R has one row of them along its slope:
 
-        l_w,min = R / tan(angle/2) + R + L cos(angle)                                            (2.12)
-        phi = pi R^2 (4/3 R + L) / (R l_w,min^2 tan(angle))                                      (2.13)
+        l_min = R/tan(angle/2) + R + L cos(angle)                                                (2.12)
+        phi = pi R^2 (4/3 R + L)/(R l_min^2 tan(angle))                                          (2.13)
 
     Source: B16 sections 2.2.4 and 2.4, Figs 2.3 and 2.9.
     """
@@ -45,7 +45,7 @@ class WedgeContainer(Container):
 
     @staticmethod
     def shortest(angle: float, aspect_ratio: float = 1.0) -> float:
-        """Return the length l_w,min (D) of the shortest wedge for one row of rods (2.12).
+        """Return the length l_min (D) of the shortest wedge for one row of rods (2.12).
 
         angle : of the wedge (rad). aspect_ratio : Lambda = L/D + 1.
         """
@@ -103,10 +103,10 @@ class WedgeContainer(Container):
     def wall(self, w, k, place, side, unit):
         zero = 0.0 * place[0]
         distance, outward = place[1], ti.Vector([zero, zero - 1.0, zero])
-        if k == SLOPE:
+        if k == SLOPE_PLANE:
             distance = self.sine(w) * place[0] - self.cosine(w) * place[1]
             outward = ti.Vector([zero - self.sine(w), zero + self.cosine(w), zero])
-        elif k == BACK:
+        elif k == BACK_PLANE:
             distance = self.length(w) * unit - place[0]
             outward = ti.Vector([zero + 1.0, zero, zero])
         return distance, outward

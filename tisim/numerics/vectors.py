@@ -106,6 +106,18 @@ def turn_between(a, b):
 
 
 @ti.func
+def orientation_of(x, z):
+    """Return the unit quaternion of the rotation that brings the axes x and z onto two unit vectors normal to
+    each other."""
+    zero, one = 0.0 * x[0], 0.0 * x[0] + 1.0
+    first = turn_between(ti.Vector([zero, zero, one]), z)
+    before = rotated(first, ti.Vector([one, zero, zero]))
+    # About z by the angle t, with cos(t/2) and sin(t/2) as in turn_between.
+    sine = ti.select(before.cross(x).dot(z) < 0.0, -0.5, 0.5) * (before - x).norm()
+    return product(ti.Vector([0.5 * (before + x).norm(), sine * z[0], sine * z[1], sine * z[2]]), first)
+
+
+@ti.func
 def rotation_matrix(q):
     """Return the 3 x 3 matrix of a unit quaternion; its columns are the rotated coordinate axes."""
     w, x, y, z = q[0], q[1], q[2], q[3]

@@ -16,10 +16,14 @@ from tisim.shapes.particle_shape import ParticleShape
 TRIED_TOGETHER = 100_000
 """Places that are tried at once."""
 MOST_TRIED = 200_000_000
-"""Largest number of places that are tried for a start."""
+"""Largest number of places that are tried for a start, of which a narrow container has few inside."""
+MOST_TAKEN = 20_000
+"""Largest number of places inside, one after the other, that are tried for a body."""
+GILBERT_STEPS = 30
+"""Steps of Gilbert's method, after which bodies that are not proved to be apart count as overlapping."""
 PARALLEL = 1e-12
 """Squared sine of the angle below which rods count as parallel."""
-ROUNDING = 1e-12
+WALL_ROUNDING = 1e-12
 """Bodies may cross a wall by this part of D, which is lost to rounding."""
 
 
@@ -59,8 +63,7 @@ def random_bodies(
     cube. seed : of the random numbers.
 
     The bodies are placed one after another. Each is drawn uniformly from all positions and orientations until
-    it crosses no wall and overlaps no other body. Bodies that are neither rods nor spheres are kept apart by
-    their bounding spheres. InputError is raised if no further place is found.
+    it crosses no wall and overlaps no other body. InputError is raised if no further place is found.
 
     Source: B16 sections 2.2.1 and 2.2.4.
     """
@@ -72,26 +75,28 @@ def random_bodies(
     images = np.where(periodic, side, 0.0)
     generator = np.random.default_rng([seed, 0xB0D135])
     position, orientation = np.empty((number, 3)), np.empty((number, 4))
-    placed = tried = 0
+    placed = tried = taken = 0
     while placed < number:
-        if tried >= MOST_TRIED:
-            rule = f"one at which {number} bodies find places in {MOST_TRIED:.0e} trials in this container"
+        if tried >= MOST_TRIED or taken >= MOST_TAKEN:
+            rule = f"one at which {number} bodies find places at random"
             raise InputError(f"fraction must be {rule}; received {fraction:g}, with {placed} of them placed")
         some = TRIED_TOGETHER if placed or container is not None else number
         numbers = generator.uniform(size=(some, 3))
         places, turns = side * numbers, Rotation.random(some, rng=generator).as_quat(scalar_first=True)
         if container is not None:
             places = container.points(numbers, side, unit, unit / 2)
-            inside = wall_gaps(shape, places, turns, container, side).min(axis=1) >= -ROUNDING * unit
+            inside = wall_gaps(shape, places, turns, container, side).min(axis=1) >= -WALL_ROUNDING * unit
             places, turns = places[inside], turns[inside]
         # The lower face of a periodic box belongs to it, the upper one does not.
         places = np.minimum(places, np.nextafter(side, 0.0))
         tried += some
         for place, turn in zip(places, turns, strict=True):
-            others = position[:placed], orientation[:placed]
-            if placed < number and _is_free(shape, place, turn, *others, side, images):
+            if placed == number or taken >= MOST_TAKEN:
+                break
+            others, taken = (position[:placed], orientation[:placed]), taken + 1
+            if _is_free(shape, place, turn, *others, side, images):
                 position[placed], orientation[placed] = place, turn
-                placed += 1
+                placed, taken = placed + 1, 0
     high = (float(side[0]), float(side[1]), float(side[2]))
     box = Box(low=(0.0, 0.0, 0.0), high=high, periodic=periodic)
     return RandomBodies(position, orientation, shape.bounding_radius(), shape.volume(), box)
@@ -112,13 +117,44 @@ def _is_free(
     apart -= images * np.rint(apart / side)
     near = np.einsum("ij,ij->i", apart, apart) < (2 * shape.bounding_radius()) ** 2
     rod = shape.rod()
-    if rod is None or not near.any():
-        return not near.any()
+    if not near.any():
+        return True
+    if rod is None:
+        here, there = (Rotation.from_quat(one, scalar_first=True) for one in (turn, turns[near]))
+        return bool(proved_apart(shape, apart[near], here, there).all())
     half, radius = rod
     z = np.array([0.0, 0.0, 1.0])
     axis = Rotation.from_quat(turn, scalar_first=True).apply(z)
     axes = Rotation.from_quat(turns[near], scalar_first=True).apply(z)
     return bool((segment_distances(apart[near], axis, axes, half) >= 2 * radius).all())
+
+
+def proved_apart(shape: ParticleShape, apart: np.ndarray, turn: Rotation, turns: Rotation) -> np.ndarray:
+    """Return whether bodies are proved to be apart from a body of the same shape, shape (n,).
+
+    apart : their centres minus its centre (m, shape (n, 3)). turn, turns : its orientation, and theirs.
+
+    The points of the difference of two bodies approach the point nearest to the origin. The bodies are apart
+    if a plane through one of its support points separates the difference from the origin.
+
+    Source: E. G. Gilbert, SIAM J. Control 4 (1966) 61.
+    """
+    nearest, proved = apart.copy(), np.zeros(len(apart), bool)
+    for _ in range(GILBERT_STEPS):
+        length = np.linalg.norm(nearest, axis=1)
+        normal = nearest / np.where(length > 0, length, 1.0)[:, None]
+        normal[length == 0] = [0.0, 0.0, 1.0]
+        here = turn.apply(shape.support(turn.inv().apply(normal)))
+        there = turns.apply(shape.support(turns.inv().apply(-normal)))
+        farthest = apart + there - here
+        proved |= np.einsum("ij,ij->i", farthest, normal) > 0
+        step = farthest - nearest
+        square = np.einsum("ij,ij->i", step, step)
+        share = -np.einsum("ij,ij->i", nearest, step) / np.where(square > 0, square, 1.0)
+        nearest += np.clip(share, 0.0, 1.0)[:, None] * step
+        if proved.all():
+            break
+    return proved
 
 
 def segment_distances(apart: np.ndarray, axis: np.ndarray, axes: np.ndarray, half: float) -> np.ndarray:

@@ -61,11 +61,7 @@ def contact(shape, separation, turn_i, turn_j, size=1.0):
         found = superquadric_contacts(separation[None], i, j)
         return -found.gap[0], found.normal[0], found.point_i[0], found.point_j[0]
     axis_i, axis_j = (turn.apply([0.0, 0.0, 1.0]) for turn in (turn_i, turn_j))
-    return rod_contact(separation, axis_i, axis_j, size * shape.length / 2, size * shape.diameter / 2)
-
-
-def rod_contact(separation, axis_i, axis_j, half, radius):
-    """The same for two rods, by least squares within bounds."""
+    half, radius = size * shape.length / 2, size * shape.diameter / 2
     # Both ends lie on segments: least squares within bounds, by an active set, which is exact.
     axes = np.stack([axis_i, -axis_j], axis=1)
     best = lsq_linear(axes, separation, (-half - 1e-300, half + 1e-300), method="bvls", tol=1e-15)
@@ -81,8 +77,8 @@ def attempt(
 ):
     """Positions and orientations after one attempt to remove the overlaps; B16 (2.7)-(2.10), (3.6)-(3.13).
 
-    walls : function of the place and the axis of a rod that returns its overlaps with walls: depth, normal
-    along which it leaves the wall, and point of contact.
+    walls : function of the place and the rotation of a body that returns its overlaps with walls: depth,
+    normal along which it leaves the wall, and point of contact.
     """
     x, turns = state["position"], Rotation.from_quat(state["orientation"], scalar_first=True)
     number, mass = len(x), shape.volume()
@@ -99,9 +95,8 @@ def attempt(
                 touching[j].append((depth, normal, there))
     others = [len(contacts) for contacts in touching]
     if walls is not None:
-        axes = turns.apply([0.0, 0.0, 1.0])
-        for contacts, place, axis in zip(touching, x, axes, strict=True):
-            contacts += [found for found in walls(place, axis) if found[0] > tolerance]
+        for contacts, place, turn in zip(touching, x, turns, strict=True):
+            contacts += [found for found in walls(place, turn) if found[0] > tolerance]
     places, orientations = x.copy(), turns.as_matrix()
     for i, contacts in enumerate(touching):
         if not contacts:
@@ -154,14 +149,14 @@ def test_an_attempt_equals_its_reference(shape, method):
     simulation.close()
 
 
-def deepest(state, side, shape, size):
+def deepest(state, side, shape, size, periodic=(True, True, True)):
     """The deepest overlap, in D."""
     x, scaled = state["position"], size / shape.bounding_radius()
     turns = Rotation.from_quat(state["orientation"], scalar_first=True)
     unit, depths = 2 * scaled * min(shape.half_extents()), []
     for i in range(len(x)):
         d = x[:i] - x[i]
-        d -= side * np.round(d / side)
+        d -= np.where(periodic, side * np.round(d / side), 0)
         for j in np.flatnonzero(np.linalg.norm(d, axis=1) < 2 * size):
             depths.append(contact(shape, d[j], turns[i], turns[j], scaled)[0] / unit)
     return max(depths)

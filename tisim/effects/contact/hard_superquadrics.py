@@ -8,10 +8,11 @@ from typing import ClassVar
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import HardBodies
+from tisim.numerics.vectors import orientation_of
 from tisim.shapes.ellipsoid import EllipsoidShape
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.superquadric import SuperquadricShape
-from tisim.shapes.superquadric_pairs import closest_superquadrics
+from tisim.shapes.superquadric_pairs import closest_superquadrics, farthest_point
 
 
 class SuperquadricBodies(HardBodies):
@@ -62,6 +63,33 @@ class SuperquadricBodies(HardBodies):
     def apart(self, s, w, i, j, separation, gap):
         found, _normal, _here, _there = self.closest_within(s, w, i, j, separation, gap)
         return found > gap
+
+    @ti.func
+    def support(self, s, w, i, k, direction):
+        shape = s.shape[w, i]
+        return farthest_point(
+            ti.static(self.exponents_are_2),
+            direction,
+            self.turn(s, w, i),
+            self.size(s, w, i) * self.semi_axes(w, shape),
+            self.exponents(w, shape),
+        )
+
+    @ti.func
+    def closest_virtual(self, s, w, i, point, outward, along):
+        shape = s.shape[w, i]
+        semi_axes = self.size(s, w, i) * self.semi_axes(w, shape)
+        return closest_superquadrics(
+            ti.static(self.exponents_are_2),
+            point + semi_axes[0] * outward,
+            self.turn(s, w, i),
+            semi_axes,
+            self.exponents(w, shape),
+            orientation_of(outward, along),
+            semi_axes,
+            self.exponents(w, shape),
+            0.0,
+        )
 
 
 class HardSuperquadrics(SuperquadricBodies):
