@@ -61,7 +61,11 @@ def contact(shape, separation, turn_i, turn_j, size=1.0):
         found = superquadric_contacts(separation[None], i, j)
         return -found.gap[0], found.normal[0], found.point_i[0], found.point_j[0]
     axis_i, axis_j = (turn.apply([0.0, 0.0, 1.0]) for turn in (turn_i, turn_j))
-    half, radius = size * shape.length / 2, size * shape.diameter / 2
+    return rod_contact(separation, axis_i, axis_j, size * shape.length / 2, size * shape.diameter / 2)
+
+
+def rod_contact(separation, axis_i, axis_j, half, radius):
+    """The same for two rods, by least squares within bounds."""
     # Both ends lie on segments: least squares within bounds, by an active set, which is exact.
     axes = np.stack([axis_i, -axis_j], axis=1)
     best = lsq_linear(axes, separation, (-half - 1e-300, half + 1e-300), method="bvls", tol=1e-15)
