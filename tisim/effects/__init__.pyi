@@ -45,6 +45,9 @@ from .base import (
 )
 from .constraint.prescribed_motion import PrescribedMotion as PrescribedMotion
 from .constraint.rigid_clumps import RigidClumps as RigidClumps
+from .constraint.rigid_rods import RigidRods as RigidRods
+from .constraint.rigid_shapes import RigidShapes as RigidShapes
+from .constraint.rigid_superquadrics import RigidSuperquadrics as RigidSuperquadrics
 from .contact.bond import ContactBond as ContactBond
 from .contact.capillary_bridge import CapillaryBridge as CapillaryBridge
 from .contact.dissipation import ContactDissipation as ContactDissipation

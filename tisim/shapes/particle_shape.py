@@ -65,6 +65,11 @@ class ParticleShape(Component):
         """Return the radius (m) of the sphere of the same volume."""
         return float(np.cbrt(0.75 * self.volume() / np.pi))
 
+    def contact_radius(self) -> float:
+        """Return the radius (m) of the sphere by which contact laws replace the shape at a point of contact;
+        by default the sphere of the same volume."""
+        return self.equal_volume_radius()
+
     def surface_points(self, count: int) -> np.ndarray:
         """Return points (m) on the surface, shape (count, 3), accurate to rounding.
 

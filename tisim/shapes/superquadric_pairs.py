@@ -108,6 +108,17 @@ def closest_superquadrics(
 
 
 @ti.func
+def farthest_point(ellipsoids: ti.template(), direction, semi_axes, exponents):  # type: ignore[valid-type]
+    """Return the point (m) of a superquadric that is farthest along a unit vector, in the frame of the
+    body."""
+    n, a, g = ti.cast(direction, ti.f64), ti.cast(semi_axes, ti.f64), ti.cast(exponents, ti.f64)
+    _h, x, _d, _v, _f = _support(ellipsoids, n, _constants(ellipsoids, a, g))
+    point = 0.0 * direction
+    point = x
+    return point
+
+
+@ti.func
 def _start(c, turn, a_i, a_j, start):
     """Return one of the directions from which the normal is sought, in the half space of c.
 
