@@ -46,6 +46,9 @@ def test_families_export_all_their_parts(family):
         "FilledPart",
         "FilledRegion",
         "GrainShapes",
+        "Rods",
+        "Shaped",
+        "Superquadrics",
     }
     assert missing <= shared | {"LinearSpheres", "Pairwise", "Uniform"}
 

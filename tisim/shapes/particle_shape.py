@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.components.component import Component, Vector
+from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
 
 BISECTIONS = 60
@@ -91,5 +92,8 @@ class ParticleShape(Component):
 
 
 def positive(name: str, values: Vector) -> None:
-    """Raise InputError unless all components of a vector are greater than 0."""
+    """Raise InputError unless all components of a vector (m) are greater than 0 and within the limits of
+    lengths."""
     must(all(value > 0 for value in values), name, "three numbers greater than 0", values)
+    rule = f"three numbers from {LEAST:g} to {MOST:g} m"
+    must(all(LEAST <= value <= MOST for value in values), name, rule, values)

@@ -73,7 +73,7 @@ class Shaped(Effect):
         unit = bool((np.abs(lengths - 1) <= LENGTH_TOLERANCE).all())
         must(unit, "particles.orientation", "unit quaternions", float(lengths.max(initial=1.0)))
         last, number = int(start[SHAPE.name].max(initial=0)), len(self.shapes())
-        must(last < number, "particles.shape", f"below {number}, the number of shapes", last)
+        must(last < number, "particles.shape", f"below {number}, the shapes", last)
 
     def sizes(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the size of each body of a start over the size of its shape, shape (n,)."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.domains.domain import Domain
 from tisim.effects.base import Constraint, DerivedQuantity, Effect, Field, Force, Pairwise, SceneParts, Shaped
@@ -86,6 +87,9 @@ class RigidShapes(Shaped, Constraint):
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         self.check_shapes(start)
+        fastest = float(np.abs(start.get("spin", np.zeros(1))).max(initial=0.0))
+        most = math.sqrt(np.finfo(np.float64 if runtime.precision() == "f64" else np.float32).max)
+        must(fastest < most, "particles.spin", f"below {most:.2g} rad/s, as squares must be finite", fastest)
         held = start.get("fixed", np.zeros(len(start["mass"]))) > 0
         at_rest = not start[ANGULAR_MOMENTUM.name][held].any()
         must(at_rest, "particles.spin", "0 for fixed particles", Words("a fixed particle that spins"))
@@ -100,6 +104,7 @@ class RigidShapes(Shaped, Constraint):
             given[ANGULAR_MOMENTUM.name] = self._momenta({**start, SHAPE.name: kinds}, np.asarray(turn), spin)
         return given
 
+    @np.errstate(over="ignore", invalid="ignore")
     def _momenta(self, start: Mapping[str, np.ndarray], turn: np.ndarray, spin: np.ndarray) -> np.ndarray:
         """Return the angular momenta (kg m^2/s) of bodies with spins (rad/s); zero for orientations and
         shapes that ``check_start`` refuses."""

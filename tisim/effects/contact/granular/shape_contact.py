@@ -18,7 +18,7 @@ from tisim.effects.contact.granular.spring import midway
 from tisim.effects.contact.granular.step_limit import TRAVEL
 from tisim.numerics.vectors import conjugate, rotated
 
-STILL_THE_SAME = 0.5
+SAME_NORMAL = 0.5
 """Smallest cosine between the normals midway and at the end of a step of one contact."""
 
 
@@ -27,7 +27,7 @@ def leaning(before, normal):
     """Return the tilt with which the unit vector ``before`` is along normal + tilt; 0 if they differ by too
     much to belong to the same contact."""
     along = before.dot(normal)
-    same = along > STILL_THE_SAME
+    same = along > SAME_NORMAL
     return ti.select(same, before / ti.select(same, along, 1.0) - normal, 0.0)
 
 
