@@ -15,7 +15,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.domains.domain import Domain
-from tisim.effects.base import Constraint, HardBodies, Pairwise, Shaped
+from tisim.effects.base import Constraint, Pairwise, Shaped
 from tisim.numerics.ieee import far_away
 from tisim.pairs.cell_grid import LEVELS, OfGrid, OfParticles
 from tisim.pairs.cell_phases import cell_phases, measure_phases
@@ -76,8 +76,7 @@ class HalfList(NeighbourRows):
         self.constraints = constraints
         self.within_bodies = any(law.data.within_bodies for law in laws)
         self.solid = any(law.data.solid for law in laws)
-        self.bodies = tuple(law for law in laws if isinstance(law.data, HardBodies))
-        self.shaped = tuple(one for one in constraints if isinstance(one.data, Shaped))
+        self.shaped = tuple(one for one in (*laws, *constraints) if isinstance(one.data, Shaped))
         self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
@@ -166,10 +165,11 @@ class HalfList(NeighbourRows):
     @ti.func
     def leaves_out(self, w, i, j, d, skin):
         left_out = False
-        for law in ti.static(self.bodies):
-            left_out = left_out or law.apart(self.s, w, i, j, d, skin[0])
         if ti.static(not self.within_bodies):
             left_out = self.joined(w, i, j)
+        for one in ti.static(self.shaped):
+            gap = skin[0] + ti.max(self.reach(w, i), self.reach(w, j))
+            left_out = left_out or one.apart(self.s, w, i, j, d, gap)
         return left_out
 
     @ti.func

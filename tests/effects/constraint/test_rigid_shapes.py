@@ -21,7 +21,8 @@ from tests.effects.constraint.shapes import (
     whole_momentum,
 )
 from tests.scenes import by_id, compiled, fixed, simulate
-from tisim import Box, InputError, Material, Particles, Scene
+from tisim import Box, Clump, InputError, Material, Particles, Scene
+from tisim.analysis import clump_bodies
 from tisim.effects import (
     Granular,
     Gravity,
@@ -29,6 +30,7 @@ from tisim.effects import (
     HertzMaterial,
     MindlinForce,
     RestitutionDamping,
+    RigidClumps,
     RollingEPSD,
     StokesDrag,
     TwistingMarshall,
@@ -262,6 +264,29 @@ def test_a_brick_comes_to_rest_on_its_largest_face():
     assert abs(axis(state, 1)[0, 2]) > 1 - 1e-5
     assert result.measures["walls_force_z"] == pytest.approx(-weight, rel=1e-2)
     assert state["position"][0, 2] == pytest.approx(BRICK.semi_axes[1], rel=2e-3)
+
+
+def test_a_rod_bounces_as_a_clump_of_spheres_of_the_same_body():
+    """17 spheres along a rod, with its mass and inertia. Their contacts are at the same places as long as an
+    end touches the floor; without damping, whose mass is m* for rods and that of the body for clumps."""
+    law = Granular(normal=HertzMaterial(), tangential=MindlinForce())
+    lean = Rotation.from_rotvec([0.3, 0.9, 0]).as_quat(scalar_first=True)
+    given = {"velocity": (0.2, 0, -0.5), "orientation": lean, "angular_velocity": (20, 10, -40)}
+    made = moving(ROD, [(0, 0, 2.3 * D)], (law, WEIGHT, FLOOR), 1e-6, 12_000, materials=material(), **given)
+    mass, along = made.particles.mass[0], np.linspace(-2 * D, 2 * D, 17)
+    clump = Clump(centres=[(0, 0, z) for z in along], radii=[D / 2], mass=mass,
+                  inertia=np.diag(mass * ROD.moments()))  # fmt: skip
+    particles = Particles.of_clumps(clump, [(0, 0, 2.3 * D)], **given)
+    beside = made.model_copy(update={"particles": particles, "effects": (RigidClumps(), *made.effects[1:])})
+    (rod,), (spheres,) = simulate([made]), simulate([beside])
+    body, state = clump_bodies(spheres.state), rod.state
+    assert rod.status.ok
+    assert spheres.status.ok
+    assert state["velocity"][0, 2] > 0
+    assert np.linalg.norm(state["spin"][0] - given["angular_velocity"]) > 100
+    np.testing.assert_allclose(body.position, state["position"], rtol=0, atol=1e-5 * D)
+    np.testing.assert_allclose(body.velocity, state["velocity"], rtol=0, atol=1e-5 * 0.5)
+    np.testing.assert_allclose(body.angular_velocity, state["spin"], rtol=0, atol=1e-5 * 300)
 
 
 def heap(shape, number=3, seed=1, steps=3000, dt=2e-6, walls=(FLOOR,), **more):

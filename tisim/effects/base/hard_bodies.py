@@ -75,9 +75,3 @@ class HardBodies(Shaped, Pairwise):
         return self.between(
             s, w, i, j, self.turn(s, w, i), self.turn(s, w, j), separation, ti.cast(ti.math.inf, s.real)
         )
-
-    @ti.func
-    def apart(self, s, w, i, j, separation, gap):
-        """Return whether the gap between two bodies is wider than ``gap`` (m)."""
-        found, _normal, _here, _there = self.closest(s, w, i, j, separation)
-        return found > gap

@@ -37,7 +37,7 @@ class Shaped(Effect):
     contract: ClassVar[bool] = True
     moves: ClassVar[bool] = False
     corners: ClassVar[int] = 1
-    fields: ClassVar = (ORIENTATION, SHAPE)
+    fields: ClassVar[tuple[str | Field, ...]] = (ORIENTATION, SHAPE)
 
     def shapes(self) -> Sequence[ParticleShape]:
         """Return the shapes; the field ``shape`` of a particle is an index into them."""
@@ -108,3 +108,10 @@ class Shaped(Effect):
             sufficient.
         """
         return separation[0], separation, separation, separation
+
+    @ti.func
+    def apart(self, s, w, i, j, separation, gap):
+        """Return whether the gap between two bodies is wider than ``gap`` (m)."""
+        q_i, q_j = self.turn(s, w, i), self.turn(s, w, j)
+        found, _normal, _here, _there = self.between(s, w, i, j, q_i, q_j, separation, gap)
+        return found > gap

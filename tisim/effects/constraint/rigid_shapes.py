@@ -192,6 +192,11 @@ class RigidShapes(Shaped, Constraint):
         return s.velocity[w, i], angular_velocity(self.midway(s, w, i, dt), momentum, moments)
 
     @ti.func
+    def swept(self, s, w, i):
+        # The chord of a rotation is at most twice the change of its quaternion.
+        return 2.0 * (self.turn(s, w, i) - self.before(s, w, i)).norm() * s.radius[w, i]
+
+    @ti.func
     def carried(self, s, w, i, vector, t, dt):
         return brought(vector, self.before(s, w, i), self.turn(s, w, i))
 

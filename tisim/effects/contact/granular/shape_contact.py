@@ -11,7 +11,7 @@ a second time, for the positions midway, if the law has springs: the slip of the
 normal rotates from there to the end of the step (see spring.py).
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.spring import midway
@@ -44,7 +44,7 @@ class ShapeContact:
         lasts: Any
         reach: Any
         material_pair: Any
-        turns_springs: Any
+        turns_springs: ClassVar[Any]
 
     @ti.func
     def mobility(self, s, w, i, q, arm, normal):
