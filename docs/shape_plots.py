@@ -1,6 +1,6 @@
 """Rods that flow from a hopper and bricks that settle in a box: the pictures of docs/bodies.md.
 
-    python docs/shape_plots.py [FOLDER]      writes shapes.png; about two minutes
+    python docs/shape_plots.py [FOLDER]      writes shapes.png; about three minutes
 
 The planes of a scene cannot have an outlet, so the hopper's inclined walls are rows of fixed rods.
 """
@@ -33,7 +33,7 @@ from tisim.steppers import FixedStep, Verlet
 
 D = 2e-3
 """Diameter of the rods (m)."""
-DEPTH, HALF, OUTLET, STEEPNESS = 8 * D, 9 * D, 7 * D, np.radians(60)
+DEPTH, HALF, OUTLET, STEEPNESS = 10 * D, 9 * D, 6 * D, np.radians(60)
 """Depth, half the width and outlet of the hopper (m), and the angle of its walls to the floor."""
 ROD = SpherocylinderShape(length=2 * D, diameter=D)
 BAR = SpherocylinderShape(length=DEPTH, diameter=D)
@@ -63,8 +63,8 @@ def sites(half: float, depth: float, apart: float, layers: int, low: float) -> n
     return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def hopper(layers: int = 22, duration: float = 1.0) -> tisim.Scene:
-    """Return the scene of rods in a hopper, which is open from the start."""
+def filling(layers: int = 22, duration: float = 0.7) -> tisim.Scene:
+    """Return the scene of rods that fall into a closed hopper."""
     along = 0.5 * D * np.arange(int((HALF - OUTLET / 2) / np.cos(STEEPNESS) / (0.5 * D)) + 1)
     x, z = OUTLET / 2 + D / 2 + along * np.cos(STEEPNESS), along * np.sin(STEEPNESS)
     bars = np.concatenate([np.stack([sign * x, 0 * x, z], axis=-1) for sign in (-1, 1)])
@@ -79,9 +79,24 @@ def hopper(layers: int = 22, duration: float = 1.0) -> tisim.Scene:
         orientation=np.where(bar[:, None], ALONG_Y, turns),
         quantities={"fixed": bar},
     )
+    return hopper(particles, [Plane(normal=(0, 0, 1)), *sides(HALF, DEPTH)], duration)
+
+
+def flowing(filled: dict[str, np.ndarray], duration: float = 0.2) -> tisim.Scene:
+    """Return the scene of a filled hopper without its floor."""
+    names = ("shape", "orientation", "spin", "fixed")
+    particles = tisim.Particles(
+        **{name: filled[name] for name in ("position", "velocity", "radius", "mass")},
+        quantities={name: filled[name] for name in names},
+    )
+    return hopper(particles, sides(HALF, DEPTH), duration)
+
+
+def hopper(particles: tisim.Particles, planes: list[Plane], duration: float) -> tisim.Scene:
+    """Return a scene of rods between planes."""
     return tisim.Scene(
         particles=particles,
-        effects=(RigidRods(rods=(ROD, BAR)), *LAWS, Walls(planes=sides(HALF, DEPTH))),
+        effects=(RigidRods(rods=(ROD, BAR)), *LAWS, Walls(planes=planes)),
         materials=MATERIALS,
         stepper=Verlet(control=FixedStep(dt=STEP)),
         duration=duration,
@@ -138,28 +153,28 @@ def main(folder: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    scene, figure = hopper(), pyplot.figure(figsize=(10, 4.6), layout="constrained")
-    panels = figure.subplots(1, 4, width_ratios=(1, 1, 1, 1))
-    flowing = tisim.Simulation(scene, worlds=1, capacity=scene.capacity())
-    flowing.load([scene])
-    times = (0.15, 0.45, 1.0)
-    for axes, time in zip(panels, times, strict=False):
-        flowing.run(until=time)
-        (result,) = flowing.results()
+    figure = pyplot.figure(figsize=(10, 4.4), layout="constrained")
+    panels = figure.subplots(1, 4, width_ratios=(1, 1, 1, 1.25))
+    scene = flowing(tisim.run(filling()).state)
+    simulation = tisim.Simulation(scene, worlds=1, capacity=scene.capacity())
+    simulation.load([scene])
+    for axes, time in zip(panels, (0.0, 0.07, 0.2), strict=False):
+        simulation.run(until=time)
+        (result,) = simulation.results()
         state, bar = result.state, result.state["shape"] == 1
-        speed = np.clip(np.linalg.norm(state["velocity"], axis=1) / 0.6, 0, 1)
+        speed = np.clip(np.linalg.norm(state["velocity"], axis=1) / 0.5, 0, 1)
         colour = np.where(bar[:, None], 0.55, pyplot.get_cmap("viridis")(speed)[:, :3])
         draw(axes, state, (ROD, BAR), colour)
         below = int((state["position"][~bar, 2] < 0).sum())
-        axes.set(xlim=(-20, 20), ylim=(-30, 85), title=f"{time:g} s, {below} of {(~bar).sum()} out")
-        edges = 1e3 * np.array([[(s * HALF, 0), (s * HALF, 1)] for s in (-1, 1)]) + [0, 0]
-        axes.add_collection(LineCollection(edges, colors="grey"))
+        axes.set(xlim=(-20, 20), ylim=(-25, 40), title=f"{time:g} s: {below} of {(~bar).sum()} out")
+        edges = 1e3 * np.array([[(s * HALF, 0.016), (s * HALF, 1)] for s in (-1, 1)])
+        axes.add_collection(LineCollection(list(edges), colors="grey"))
         print(f"{time:g} s: {result.status.reason}; {below} rods out", flush=True)
     result = tisim.run(box())
     state = result.state
     tints = np.array([(0.85, 0.45, 0.3), (0.35, 0.55, 0.8)])[state["shape"].astype(int)]
     draw(panels[3], state, (BRICK, EGG), tints)
-    panels[3].set(xlim=(-12.5, 12.5), ylim=(-0.5, 45), title="bricks and ellipsoids at rest")
+    panels[3].set(xlim=(-12.5, 12.5), ylim=(-0.5, 16), title="bricks and ellipsoids at rest")
     energy = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
     energy += 0.5 * (state["angular_momentum"] * state["spin"]).sum()
     fall = (state["mass"] * 9.81 * D).sum()

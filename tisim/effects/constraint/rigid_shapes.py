@@ -37,7 +37,7 @@ class RigidShapes(Shaped, Constraint):
     Q is the rotation by the orientation of the body, I the diagonal matrix of its principal moments of
     inertia for a uniform density. Position and velocity are integrated by velocity Verlet. The orientation is
     integrated by five rotations about principal axes between half kicks of the angular momentum L, which is
-    symplectic and of second order: without torques L is constant to rounding.
+    symplectic and of second order: without torques L is constant.
 
     Bodies touch each other and planes by the granular contact laws of the scene. These receive the gap of the
     shapes, its normal and the point of contact; the torque is the force times its lever. ``contact_radius``
