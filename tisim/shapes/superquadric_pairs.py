@@ -109,13 +109,11 @@ def closest_superquadrics(
 
 @ti.func
 def farthest_point(ellipsoids: ti.template(), direction, semi_axes, exponents):  # type: ignore[valid-type]
-    """Return the point (m) of a superquadric that is farthest along a unit vector, in the frame of the
-    body."""
-    n, a, g = ti.cast(direction, ti.f64), ti.cast(semi_axes, ti.f64), ti.cast(exponents, ti.f64)
-    _h, x, _d, _v, _f = _support(ellipsoids, n, _constants(ellipsoids, a, g))
-    point = 0.0 * direction
-    point = x
-    return point
+    """Return the point (m, f64) of a superquadric that is farthest along a unit vector (f64), in the frame of
+    the body."""
+    a, g = ti.cast(semi_axes, ti.f64), ti.cast(exponents, ti.f64)
+    _h, x, _d, _v, _f = _support(ellipsoids, direction, _constants(ellipsoids, a, g))
+    return x
 
 
 @ti.func

@@ -90,31 +90,47 @@ def gap(shape, separation, turns):
     return -best.fun * D, n, here, there
 
 
-def reference(scene, shape, push, time, contact=gap):
-    """Position, velocity, rotation and angular momentum of two equal bodies after a time (s), which repel
-    each other by ``push(overlap)`` (N) along the normal; by an ODE solver."""
+def turning(shape, x, v, turns, spins, contact=gap, h=1e-7):
+    """Angular velocity (rad/s) of the normal of a contact, by central differences over h (s)."""
+    ahead, behind = (
+        contact(shape, x[1] - x[0] + t * (v[1] - v[0]), Rotation.from_rotvec(t * spins) * turns)[1]
+        for t in (h, -h)
+    )
+    return np.cross(ahead + behind, ahead - behind) / (4 * h)
+
+
+def reference(scene, shape, push, time, grip=0.0, contact=gap):
+    """Position, velocity, rotation and angular momentum of two equal bodies after a time (s), by an ODE
+    solver. They repel each other by ``push(overlap)`` (N) along the normal, and stick by a spring ``grip``
+    (N/m), which rotates with the normal and, about it, with the mean of both spins."""
     start = scene.start()
     mass, moments = start["mass"][0], start["mass"][0] * shape.moments()
 
     def split(y):
-        x, v, q, momenta = (part.reshape(2, -1) for part in np.split(y, [6, 12, 20]))
+        x, v, q, momenta = (part.reshape(2, -1) for part in np.split(y[:26], [6, 12, 20]))
         turns = Rotation.from_quat(q / np.linalg.norm(q, axis=1)[:, None], scalar_first=True)
         return x, v, q, momenta, turns
 
     def rate(_t, y):
         x, v, q, momenta, turns = split(y)
         apart, n, here, there = contact(shape, x[1] - x[0], turns)
-        force = push(max(-apart, 0.0)) * n
         spins = turns.apply(turns.apply(momenta, inverse=True) / moments)
-        turning = 0.5 * np.array(
+        force, stretch = push(max(-apart, 0.0)) * n, np.zeros(3)
+        if grip > 0 and apart < 0:
+            here, there, held = here + apart / 2 * n, there - apart / 2 * n, y[26:]
+            slip = v[1] - v[0] + np.cross(spins[1], there) - np.cross(spins[0], here)
+            frame = turning(shape, x, v, turns, spins, contact) + n * (spins.mean(axis=0) @ n)
+            stretch, force = slip - (slip @ n) * n + np.cross(frame, held), force - grip * held
+        change = 0.5 * np.array(
             [[-w @ p[1:], *(p[0] * w + np.cross(w, p[1:]))] for w, p in zip(spins, q, strict=True)]
         )
         torque = np.stack([np.cross(here, -force), np.cross(there, force)])
-        return np.concatenate([v.ravel(), (np.stack([-force, force]) / mass).ravel(), turning.ravel(),
-                               torque.ravel()])  # fmt: skip
+        pull = np.stack([-force, force]) / mass
+        return np.concatenate([v.ravel(), pull.ravel(), change.ravel(), torque.ravel(), stretch])
 
     names = ("position", "velocity", "orientation", "angular_momentum")
-    y = np.concatenate([np.asarray(start[name]).ravel() for name in names])
-    scale = np.concatenate([np.full(6, D), np.full(6, 0.1), np.ones(8), np.full(6, moments.max() * 100)])
+    y = np.concatenate([*(np.asarray(start[name]).ravel() for name in names), np.zeros(3)])
+    spin = moments.max() * 100
+    scale = np.concatenate([np.full(6, D), np.full(6, 0.1), np.ones(8), np.full(6, spin), np.full(3, D)])
     end = solve_ivp(rate, (0, time), y, "DOP853", rtol=1e-8, atol=1e-8 * scale, max_step=time / 20)
     return split(end.y[:, -1])

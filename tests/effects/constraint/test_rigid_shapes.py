@@ -28,6 +28,8 @@ from tisim.effects import (
     Gravity,
     Hertz,
     HertzMaterial,
+    Hooke,
+    LinearSpring,
     MindlinForce,
     RestitutionDamping,
     RigidClumps,
@@ -145,6 +147,30 @@ def test_two_bodies_collide_as_in_a_numpy_reference(name):
         errors.append(max(parts))
     assert errors[0] < 5e-4
     assert errors[1] < 0.3 * errors[0]
+
+
+def test_rods_stick_by_springs_as_in_a_numpy_reference():
+    """A spring without slip. It begins at the end of the step in which the rods meet, so the error is between
+    0 and a limit of first order in dt."""
+    stiffness, kappa, errors = 300.0, 2 / 7, []
+    law = Granular(normal=Hooke(), tangential=LinearSpring(stiffness_ratio=kappa))
+    given = {"materials": {"grain": Material(stiffness=stiffness, friction=1e3)}}
+    made = colliding(ROD, law, **given)
+    x, v, q, momenta, _ = reference(made, ROD, lambda deep: stiffness * deep, 4e-3, kappa * stiffness)
+    smooth = reference(made, ROD, lambda deep: stiffness * deep, 4e-3)
+    assert np.abs(v - smooth[1]).max() > 0.03
+    for dt in (2e-6, 2.5e-7):
+        (result,) = simulate([colliding(ROD, law, dt, **given)])
+        state = result.state
+        assert result.status.ok, result.status.reason
+        parts = (
+            np.abs(state["position"] - x).max() / D,
+            np.abs(state["velocity"] - v).max() / 0.3,
+            max(turned_apart(p, r) for p, r in zip(state["orientation"], q, strict=True)),
+            np.abs(state["angular_momentum"] - momenta).max() / np.abs(momenta).max(),
+        )
+        errors.append(max(parts))
+    np.testing.assert_array_less(errors, [3e-3, 4e-4])
 
 
 @pytest.mark.parametrize("name", SHAPES)

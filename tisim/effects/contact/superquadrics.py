@@ -48,9 +48,10 @@ class Superquadrics(Shaped):
 
     @ti.func
     def between(self, s, w, i, j, q_i, q_j, separation, far):
-        return closest_superquadrics(
+        # The narrow phase is in f64 and returns its results in the precision of the separation.
+        gap, normal, here, there = closest_superquadrics(
             self.ellipsoids,
-            separation,
+            ti.cast(separation, ti.f64),
             q_i,
             self.semi_axes(s, w, i),
             self.exponents(s, w, i),
@@ -59,11 +60,12 @@ class Superquadrics(Shaped):
             self.exponents(s, w, j),
             far,
         )
+        return ti.cast(gap, s.real), ti.cast(normal, s.real), ti.cast(here, s.real), ti.cast(there, s.real)
 
     @ti.func
     def support(self, s, w, i, q, direction):
         """Return the point (m) of a superquadric that is farthest along a unit vector, relative to its
         centre, for the orientation q."""
-        inside = rotated(conjugate(q), direction)
+        inside = ti.cast(rotated(conjugate(q), direction), ti.f64)
         a, g = self.semi_axes(s, w, i), self.exponents(s, w, i)
-        return rotated(q, farthest_point(self.ellipsoids, inside, a, g))
+        return rotated(q, ti.cast(farthest_point(self.ellipsoids, inside, a, g), s.real))
