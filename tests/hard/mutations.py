@@ -136,22 +136,19 @@ WALLS = {
 }  # fmt: skip
 """Mutations of walls and their motions."""
 MOTIONS, SHAPES = "tisim/effects/constraint", "tests/effects/constraint/test_rigid_shapes.py::test_"
-RIGID_SHAPES = {
-    "rigid_rods": (
+MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
+STEPS = "tests/hard/test_granular_steps.py::test_steps_beyond_the_limit_stop_the_world"
+HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
+SHARED = {
+    "corners_of_rods": (
         f"{MOTIONS}/rigid_rods.py", "self.rod_radius(s, w, i))", "0.99 * self.rod_radius(s, w, i))",
         f"{SHAPES}a_rod_falls_and_comes_to_rest_on_both_ends",
     ),
-    "rigid_superquadrics": (
+    "corners_of_superquadrics": (
         f"{MOTIONS}/rigid_superquadrics.py", "self.support(s, w, i, q, direction)",
         "0.99 * self.support(s, w, i, q, direction)",
         f"{SHAPES}a_brick_comes_to_rest_on_its_largest_face",
     ),
-}  # fmt: skip
-"""Mutations of rods and superquadrics that move."""
-MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS, **RIGID_SHAPES}
-STEPS = "tests/hard/test_granular_steps.py::test_steps_beyond_the_limit_stop_the_world"
-HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
-SHARED = {
     "mobility": (
         f"{LAW}/shape_contact.py", "(about / inertia).dot(about)", "0.9 * (about / inertia).dot(about)",
         f"{SHAPES}restitution_holds_wherever_a_body_hits_a_floor[rods]",

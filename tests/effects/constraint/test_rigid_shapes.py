@@ -415,3 +415,20 @@ def test_invalid_scenes_are_refused(why):
     given, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         simulate([moving(ROD, [(0, 0, 0)], given.pop("effects", ()), materials=material(), **given)])
+
+
+@pytest.mark.parametrize(("moves", "slower"), [("velocity", 0.45), ("angular_velocity", 0.25)])
+def test_a_world_stops_if_bodies_may_pass_through_each_other(moves, slower):
+    """If a point of a rod may move by more than its radius in a step, by its velocity or its rotation; along
+    three axes, as far as the rotation is concerned."""
+    motion, far = {"velocity": 10.0, "angular_velocity": 4000.0}[moves], [(-0.02, 0, 0), (0.02, 0, 0)]
+
+    def reason(value):
+        given = {moves: [(value, 0, 0), (-value, 0, 0)], "orientation": (1, 0, 0, 0)}
+        (result,) = simulate([moving(ROD, far, (LAW,), 1e-4, 10, materials=material(), **given)])
+        return result.status.reason
+
+    message = reason(motion)
+    assert "pass through each other: particle 0 moves by 0.001 m relative to the others" in message
+    assert "the smallest half extent is 0.0005 m; it must be below 5e-05 s" in message
+    assert reason(slower * motion) == "reached its end"
