@@ -160,7 +160,9 @@ class Particles(Start):
         the positions, one row may be given for all.
         """
         centres = np.asarray(position, float)
-        n, known = len(centres), [shapes] if isinstance(shapes, ParticleShape) else list(shapes)
+        known = list(shapes) if isinstance(shapes, list | tuple) else [shapes]
+        n, right = len(centres), bool(known) and all(isinstance(one, ParticleShape) for one in known)
+        must(right, "particles.shapes", "shapes of tisim.shapes", Words(f"{shapes!r:.80}"))
         kinds = _of_each("particles.shape", shape, n)
         whole = kinds.dtype.kind in "iu" and bool(((kinds >= 0) & (kinds < len(known))).all())
         must(whole, "particles.shape", f"indices of the {len(known)} shapes", shape)

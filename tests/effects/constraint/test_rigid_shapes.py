@@ -21,7 +21,7 @@ from tests.effects.constraint.shapes import (
     whole_momentum,
 )
 from tests.scenes import by_id, compiled, fixed, simulate
-from tisim import Box, Clump, InputError, Material, Particles, Scene
+from tisim import Box, Clump, GrainClass, InputError, Material, Particles, Scene
 from tisim.analysis import clump_bodies
 from tisim.effects import (
     Granular,
@@ -31,6 +31,7 @@ from tisim.effects import (
     Hooke,
     LinearSpring,
     MindlinForce,
+    PrescribedMotion,
     RestitutionDamping,
     RigidClumps,
     RollingEPSD,
@@ -39,7 +40,8 @@ from tisim.effects import (
     Walls,
 )
 from tisim.geometry import Disc, Plane
-from tisim.operators import AtRest
+from tisim.operators import AtRest, InsertionByFlux
+from tisim.packing import EqualSizes
 from tisim.steppers import Boris, FixedStep
 
 SHAPES = {"rods": ROD, "eggs": EGG, "bricks": BRICK}
@@ -394,6 +396,10 @@ def test_the_mass_and_the_orientation_of_a_start_are_those_asked_for():
     np.testing.assert_allclose(scene.start()["angular_momentum"][1], [0, 0, 7 * ball], rtol=1e-12, atol=1e-22)
 
 
+RAIN = InsertionByFlux(
+    grains=[GrainClass(sizes=EqualSizes(radius=D), density=DENSITY)], number=5, low=(0, 0, 0.05),
+    high=(0.02, 0.02, 0.07), flux=1e6,
+)  # fmt: skip
 REFUSED = {
     "stepper": ({"stepper": Boris(control=FixedStep(dt=1e-6))}, "stepper must be one that follows constr"),
     "another law": (
@@ -406,6 +412,18 @@ REFUSED = {
         "effects.walls must be made of planes, with effects.rigid_rods; received 'discs'",
     ),
     "no such shape": ({"shape": 1}, "particles.shape must be indices of the 1 shapes"),
+    "prescribed motion": (
+        {"effects": (PrescribedMotion(group=1),), "quantities": {"group": [1]}},
+        "particles must be held by one of rigid_rods, prescribed_motion; received one held by 2",
+    ),
+    "insertion": (
+        {"effects": (RAIN,)},
+        "effects.insertion_by_flux must be without inserted particles, with effects.rigid_rods",
+    ),
+    "a fixed rod that spins": (
+        {"quantities": {"fixed": [1]}, "angular_velocity": (1, 0, 0)},
+        "particles.spin must be 0 for fixed particles",
+    ),
     "a long quaternion": ({"orientation": (2, 0, 0, 0)}, "particles.orientation must be unit quaternions"),
 }
 
@@ -432,3 +450,21 @@ def test_a_world_stops_if_bodies_may_pass_through_each_other(moves, slower):
     assert "pass through each other: particle 0 moves by 0.001 m relative to the others" in message
     assert "the smallest half extent is 0.0005 m; it must be below 5e-05 s" in message
     assert reason(slower * motion) == "reached its end"
+
+
+def test_steps_are_limited_by_the_mobility_of_the_point_of_contact():
+    """Steps must be below 2 sqrt(m*/k), at an end of a rod 0.63 of the limit for its mass."""
+    stiffness, lean, law = 1000.0, 0.6, Granular(normal=Hooke())
+    turn = Rotation.from_rotvec([0, np.pi / 2 + lean, 0]).as_quat(scalar_first=True)
+    height = D / 2 + 2 * D * np.sin(lean) - 1e-3 * D
+    mass, across = DENSITY * ROD.volume(), ROD.moments()[0]
+    easy = 1 + (2 * D * np.cos(lean)) ** 2 / across
+    assert np.sqrt(1 / easy) < 0.64
+    reasons = []
+    for part in (0.98, 1.02):
+        dt = part * 2 * np.sqrt(mass / easy / stiffness)
+        given = {"materials": {"grain": Material(stiffness=stiffness)}, "orientation": turn}
+        (result,) = simulate([moving(ROD, [(0, 0, height)], (law, FLOOR), dt, 3, **given)])
+        reasons.append(result.status.reason)
+    assert reasons[0] == "reached its end"
+    assert "a step is too long for the springs and dashpots of a contact" in reasons[1]
