@@ -44,6 +44,7 @@ from tisim.operators import AtRest, InsertionByFlux
 from tisim.packing import EqualSizes
 from tisim.steppers import Boris, FixedStep
 
+pytestmark = pytest.mark.long
 SHAPES = {"rods": ROD, "eggs": EGG, "bricks": BRICK}
 ELASTIC = Granular(normal=HertzMaterial())
 LAW = Granular(
@@ -125,7 +126,7 @@ def test_a_free_top_keeps_its_angular_momentum_and_turns_to_second_order(shape):
     assert energies[2] < 2e-5
 
 
-@pytest.mark.parametrize("name", ["rods", pytest.param("eggs", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["rods", pytest.param("eggs", marks=pytest.mark.slow)])
 def test_two_bodies_collide_as_in_a_numpy_reference(name):
     shape, errors = SHAPES[name], []
     effective = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
@@ -294,6 +295,7 @@ def test_a_brick_comes_to_rest_on_its_largest_face():
     assert state["position"][0, 2] == pytest.approx(BRICK.semi_axes[1], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_rod_bounces_as_a_clump_of_spheres_of_the_same_body():
     """17 spheres along a rod, with its mass and inertia. Their contacts are at the same places as long as an
     end touches the floor; without damping, whose mass is m* for rods and that of the body for clumps."""
@@ -330,6 +332,7 @@ def heap(shape, number=3, seed=1, steps=3000, dt=2e-6, walls=(FLOOR,), **more):
     return moving(shape, place, effects, dt, steps, **given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rods", "bricks"])
 def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(name, tmp_path):
     made = heap(SHAPES[name], steps=2000)
@@ -350,6 +353,7 @@ def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(name, 
             np.testing.assert_array_equal(again.state[field], values, err_msg=field)
 
 
+@pytest.mark.slow
 def test_bodies_collide_across_the_faces_of_a_box():
     box = Box(low=(0, 0, 0), high=(0.02, 0.02, 0.02))
     ends = []
