@@ -73,6 +73,9 @@ EFFECTS = {
     f" {CONTACT}",
     "reaction": f"{HEATING}, Reaction(energy_density=1e3)",
     "rigid_clumps": f"RigidClumps(), {CONTACT}",
+    "rigid_rods": f"RigidRods(rods=[SpherocylinderShape(length=2e-3, diameter=1e-3)]), {GRANULAR}",
+    "rigid_superquadrics": "RigidSuperquadrics(superquadrics=[SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3),"
+    f" exponents=(4, 4, 4))]), {GRANULAR}",
     "schiller_naumann_drag": "SchillerNaumannDrag(density=1.2, viscosity=1.8e-5)",
     "self_gravity": "SelfGravity()",
     "softened_self_gravity": "SoftenedSelfGravity(softening_length=1e-4)",
@@ -178,7 +181,21 @@ GIVEN = {
         ),
         position=[[0, 0, 0], [2.85e-3, 0, 2e-4]],
         velocity=[[0.1, 0, 0], [-0.1, 0, 0]],
-    )"""
+    )""",
+    "rigid_rods": """particles=tisim.Particles.of_shapes(
+        SpherocylinderShape(length=2e-3, diameter=1e-3),
+        position=[[0, 0, 0], [9.9e-4, 0, 1e-4]],
+        velocity=[[0.1, 0, 0], [-0.1, 0, 0]],
+        orientation=[[1, 0, 0, 0], [0.8, 0.6, 0, 0]],
+        density=2500.0,
+    )""",
+    "rigid_superquadrics": """particles=tisim.Particles.of_shapes(
+        SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3), exponents=(4, 4, 4)),
+        position=[[0, 0, 0], [1.99e-3, 0, 1e-4]],
+        velocity=[[0.1, 0, 0], [-0.1, 0, 0]],
+        orientation=[[1, 0, 0, 0], [0.8, 0.6, 0, 0]],
+        density=2500.0,
+    )""",
 }
 """Particles that are no two grains."""
 
@@ -250,7 +267,7 @@ def _names(code: str) -> dict[str, Any]:
 
 def _homes(code: str) -> list[tuple[str, str]]:
     """Package and name of each public class that code calls."""
-    packages = ("effects", "sources", "operators", "steppers", "packing", "geometry")
+    packages = ("effects", "sources", "operators", "steppers", "packing", "geometry", "shapes")
     found = []
     for name in sorted(set(re.findall(r"\b(?<!\.)[A-Z]\w+(?=\()", code))):
         homes = (f"tisim.{one}" for one in packages if hasattr(importlib.import_module(f"tisim.{one}"), name))

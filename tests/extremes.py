@@ -37,6 +37,7 @@ from tisim.effects import (
     Mie,
     NearField,
     PermanentMoment,
+    RigidShapes,
     StokesDrag,
     Tether,
     TruncatedDipoleDipole,
@@ -78,6 +79,10 @@ COMMON: dict[str, dict[str, Any]] = {
         "cohesion": "dmt",
     },
     "capillary_bridge": {"volume": 1e-12},
+    "rigid_rods": {"rods": [{"length": 2e-3, "diameter": 1e-3}]},
+    "rigid_superquadrics": {
+        "superquadrics": [{"semi_axes": [1e-3, 7e-4, 2e-3], "exponents": [4.0, 2.0, 3.0]}]
+    },
     "parallel_bond": {"gap": 1e-4, "young": 1e6, "tensile_strength": 1e6, "shear_strength": 1e6},
     "walls": {
         "planes": [{"point": [0.0, 0.0, -9e-4], "normal": [0.0, 0.0, 1.0]}],
@@ -201,7 +206,7 @@ def _company(kind: type[Effect]) -> dict[str, Any]:
     felt: tuple[type[Effect], ...] = ()
     if issubclass(kind, Source):
         felt = FIELDS.get(kind.quantity, (Lorentz, LangevinMoment, Magnetophoresis))
-    elif issubclass(kind, Walls):
+    elif issubclass(kind, Walls | RigidShapes):
         felt = (Granular,)
     elif issubclass(kind, PermanentMoment):
         felt = (MagneticSpheres, Magnetophoresis, TruncatedDipoleDipole)

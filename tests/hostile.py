@@ -161,7 +161,7 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
 def _required(kind: type[Component]) -> dict[str, Any]:
     """A valid value for each required parameter."""
     fit = {"cutoff": 4.0, "low": (0.0, 0.0, 0.0), "high": (4.0, 4.0, 4.0), "second": 4.0}
-    fit |= {"duct_radius": 4.0}
+    fit |= {"duct_radius": 4.0, "semi_axes": (0.5, 0.4, 0.3), "exponents": (2.0, 3.0, 4.0)}
     values = {
         name: fit.get(name, 0.5 if size == 1 else (0.0, 0.0, 0.5))
         for name, info, size in kind.parameters()

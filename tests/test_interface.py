@@ -47,6 +47,9 @@ def test_families_export_all_their_parts(family):
         "FilledRegion",
         "GrainShapes",
         "PackingStepper",
+        "Rods",
+        "Shaped",
+        "Superquadrics",
     }
     assert missing <= shared | {"LinearSpheres", "Pairwise", "Uniform"}
 

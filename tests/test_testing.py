@@ -22,6 +22,8 @@ from tisim.effects import (
     PermanentMoment,
     PrescribedMotion,
     RigidClumps,
+    RigidRods,
+    RigidSuperquadrics,
     Tether,
     TruncatedDipoleDipole,
     Virial,
@@ -358,11 +360,24 @@ def test_a_field_that_only_others_declare_is_reported():
 
 # Capture, constraints and the virial exclude impacts. Cylinders have no force law, and their series takes
 # long to compile. Outflow weighs particles before it removes them. Permanent moments exclude soft ones. Tree
-# gravity has no images, which Ewald sums need. Dipole forces go only with mutual moments of the same cut-off.
+# gravity has no images, which Ewald sums need. Rigid shapes exclude laws for spheres. Dipole forces go only
+# with mutual moments of the same cut-off.
+RODS, BRICKS = [RigidRods], [RigidSuperquadrics]
 HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 DIPOLES = [DipoleDipole, TruncatedDipoleDipole]
-APART = (Capture, MagneticCylinders, Outflow, PermanentMoment, Virial, *HOLDING, *IMAGED, *DIPOLES)
+APART = (
+    Capture,
+    MagneticCylinders,
+    Outflow,
+    PermanentMoment,
+    Virial,
+    *RODS,
+    *BRICKS,
+    *HOLDING,
+    *IMAGED,
+    *DIPOLES,
+)
 TOGETHER = [
     *(kind for kind in known_effects() if kind not in APART and not extremes.for_packings(kind)),
     Outflow,
@@ -375,10 +390,21 @@ TOGETHER = [
     [
         [Capture, Virial],
         HOLDING,
+        RODS,
+        BRICKS,
         [PermanentMoment],
         *(pytest.param(kinds, marks=pytest.mark.slow) for kinds in (TOGETHER, DIPOLES, IMAGED)),
     ],
-    ids=["capture", "constraints", "permanent moments", "all that go together", "dipoles", "Ewald sums"],
+    ids=[
+        "capture",
+        "constraints",
+        "rods",
+        "superquadrics",
+        "permanent moments",
+        "all that go together",
+        "dipoles",
+        "Ewald sums",
+    ],
 )
 def test_effects_declare_the_fields_that_they_read(kinds):
     assert_fields(joined(kinds))

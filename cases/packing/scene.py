@@ -17,10 +17,10 @@ import numpy as np
 
 from tisim import Particles, Scene
 from tisim.cases.case import Size, size_named
-from tisim.effects import Confinement, Effect, HardEllipsoids, HardRods, HardSuperquadrics
+from tisim.effects import Confinement, Effect, HardRods, HardSuperquadrics
 from tisim.geometry.container import Container
 from tisim.packing import random_bodies
-from tisim.shapes import EllipsoidShape, SpherocylinderShape, SuperquadricShape
+from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.steppers import MechanicalContraction
 
@@ -57,18 +57,16 @@ def superball(exponent: float) -> SuperquadricShape:
     return SuperquadricShape(semi_axes=(half, half, half), exponents=(exponent, exponent, exponent))
 
 
-def spheroid(aspect: float) -> EllipsoidShape:
+def spheroid(aspect: float) -> SuperquadricShape:
     """Return an ellipsoid of revolution, ``aspect`` times as long as wide."""
     half = DIAMETER / 2
-    return EllipsoidShape(semi_axes=(half, half, aspect * half))
+    return SuperquadricShape(semi_axes=(half, half, aspect * half), exponents=(2.0, 2.0, 2.0))
 
 
 def hard(shape: ParticleShape) -> Effect:
     """Return the effect of hard bodies of one shape."""
     if isinstance(shape, SuperquadricShape):
         return HardSuperquadrics(superquadrics=(shape,))
-    if isinstance(shape, EllipsoidShape):
-        return HardEllipsoids(ellipsoids=(shape,))
     assert isinstance(shape, SpherocylinderShape)
     return HardRods(rods=(shape,))
 

@@ -77,18 +77,13 @@ CONTACT = "tisim/effects/contact"
 LAWS = "tests/effects/contact/test_contact.py::test_contact_equals_its_numpy_reference"
 SOFT_GRAINS = {
     "hard_rods": (
-        f"{CONTACT}/hard_rods.py", "0.5 * self.size(s, w, i) * self.rods.diameter",
+        f"{CONTACT}/rods.py", "0.5 * self.size(s, w, i) * self.rods.diameter",
         "0.4 * self.size(s, w, i) * self.rods.diameter",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[revised]",
     ),
-    "hard_ellipsoids": (
-        f"{CONTACT}/hard_superquadrics.py", "return self.ellipsoids.semi_axes(w, k)",
-        "return 0.9 * self.ellipsoids.semi_axes(w, k)",
-        "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[ellipsoids]",
-    ),
     "hard_superquadrics": (
-        f"{CONTACT}/hard_superquadrics.py", "return self.superquadrics.exponents(w, k)",
-        "return 2.0 + 0.0 * self.superquadrics.exponents(w, k)",
+        f"{CONTACT}/superquadrics.py", "return self.superquadrics.exponents(w, s.shape[w, i])",
+        "return 2.0 + 0.0 * self.superquadrics.exponents(w, s.shape[w, i])",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[cuboids]",
     ),
     "confinement": (
@@ -151,10 +146,33 @@ WALLS = {
     ),
 }  # fmt: skip
 """Mutations of walls and their motions."""
+MOTIONS, SHAPES = "tisim/effects/constraint", "tests/effects/constraint/test_rigid_shapes.py::test_"
 MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
 STEPS = "tests/hard/test_granular_steps.py::test_steps_beyond_the_limit_stop_the_world"
 HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
 SHARED = {
+    "corners_of_rods": (
+        f"{MOTIONS}/rigid_rods.py", "self.rod_radius(s, w, i))", "0.99 * self.rod_radius(s, w, i))",
+        f"{SHAPES}a_rod_falls_and_comes_to_rest_on_both_ends",
+    ),
+    "corners_of_superquadrics": (
+        f"{MOTIONS}/rigid_superquadrics.py", "self.farthest(s, w, i, q, direction)",
+        "0.99 * self.farthest(s, w, i, q, direction)",
+        f"{SHAPES}a_brick_comes_to_rest_on_its_largest_face",
+    ),
+    "mobility": (
+        f"{LAW}/shape_contact.py", "(about / inertia).dot(about)", "0.9 * (about / inertia).dot(about)",
+        f"{SHAPES}restitution_holds_wherever_a_body_hits_a_floor[rods]",
+    ),
+    "free_bodies": (
+        f"{MOTIONS}/rigid_shapes.py", "s.radius[w, i] * s.radius[w, i] * self.inertia",
+        "s.radius[w, i] * s.radius[w, i] * 1.01 * self.inertia",
+        f"{SHAPES}a_free_top_keeps_its_angular_momentum_and_turns_to_second_order[egg]",
+    ),
+    "levers": (
+        f"{LAW}/shape_contact.py", "arm_i = x_i - 0.5 * overlap * normal", "arm_i = 0.99 * x_i",
+        f"{SHAPES}two_bodies_collide_as_in_a_numpy_reference[rods]",
+    ),
     "eased": (
         f"{LAW}/spring.py", "ti.min(stiffness", "ti.max(stiffness",
         f"{HERTZ_MINDLIN}a_closed_path_gains_no_work",

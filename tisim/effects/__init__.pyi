@@ -48,6 +48,9 @@ from .base import (
 )
 from .constraint.prescribed_motion import PrescribedMotion as PrescribedMotion
 from .constraint.rigid_clumps import RigidClumps as RigidClumps
+from .constraint.rigid_rods import RigidRods as RigidRods
+from .constraint.rigid_shapes import RigidShapes as RigidShapes
+from .constraint.rigid_superquadrics import RigidSuperquadrics as RigidSuperquadrics
 from .contact.bond import ContactBond as ContactBond
 from .contact.capillary_bridge import CapillaryBridge as CapillaryBridge
 from .contact.dissipation import ContactDissipation as ContactDissipation
@@ -115,7 +118,6 @@ from .contact.granular.twisting import (
 from .contact.granular.viscoelastic import ViscoelasticDamping as ViscoelasticDamping
 from .contact.granular.viscous import ViscousFriction as ViscousFriction
 from .contact.hard_rods import HardRods as HardRods
-from .contact.hard_superquadrics import HardEllipsoids as HardEllipsoids
 from .contact.hard_superquadrics import HardSuperquadrics as HardSuperquadrics
 from .contact.hertz import Hertz as Hertz
 from .contact.normal import NormalContact as NormalContact

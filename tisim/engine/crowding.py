@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from tisim.backend import runtime
 from tisim.backend.memory import LISTS_PART
 from tisim.collisions.contact_list import CONTACTS_PER_PARTICLE
-from tisim.effects.base import Constraint, PairEvent, Pairwise
+from tisim.effects.base import Constraint, PairEvent, Pairwise, Shaped
 from tisim.effects.walls.walls import Walls
 from tisim.errors import InputError, StartWarning
 from tisim.pairs.contact_memory import PARTNERS
@@ -58,6 +58,10 @@ def check_places(scene: Scene, start: Arrays) -> list[Deep]:
     check_skin(scene, start)
     laws = _holding(scene)
     if not laws or not len(start["mass"]):
+        return []
+    if any(isinstance(effect, Shaped) for effect in scene.effects):
+        # Spheres around bodies may overlap.
+        _Crowd(scene, start).check_coincident(laws[0].label)
         return []
     return [*_overlaps(scene, start, laws), *_in_walls(scene, start)]
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from tisim.effects.base import Shaped
 from tisim.engine.replay import Image, Replay
 from tisim.engine.result import RUNNING, Status
 from tisim.engine.worlds import Worlds
@@ -224,9 +225,15 @@ class Monitor:
         speed = np.abs(then["velocity"][w, :n] - then["frame"][w]).max(axis=1)
         if speed.max() < 1e150:
             speed = np.linalg.norm(then["velocity"][w, :n] - then["frame"][w], axis=1)
-        who, smallest = int(np.argmax(speed)), float(then["radius"][w, :n].min())
+        smallest, what = float(then["radius"][w, :n].min()), "radius"
+        for one in self.simulation.scenes[w].effects:
+            if isinstance(one, Shaped):
+                # Points of a body may move by its rotation, and it is thinner than the sphere around it.
+                speed = speed + np.linalg.norm(then["spin"][w, :n], axis=1) * then["radius"][w, :n]
+                smallest, what = smallest * one.derived_rows()["slenderness"][0], "half extent"
+        who = int(np.argmax(speed))
         moved = f"particle {then['id'][w][who]} moves by {speed[who] * dt:.3g} m relative to the others"
-        passed = f"{moved} in {dt:.4g} s, and the smallest radius is {smallest:.3g} m"
+        passed = f"{moved} in {dt:.4g} s, and the smallest {what} is {smallest:.3g} m"
         if speed[who] == 0.0:
             return passed
         return f"{passed}; it must be below {smallest / speed[who]:.3g} s, and far shorter if particles touch"

@@ -15,7 +15,7 @@ from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
 from tisim.domains.domain import Domain
-from tisim.effects.base import Constraint, HardBodies, Pairwise
+from tisim.effects.base import Constraint, Pairwise, Shaped
 from tisim.numerics.ieee import far_away
 from tisim.pairs.cell_grid import LEVELS, OfGrid, OfParticles
 from tisim.pairs.cell_phases import cell_phases, measure_phases
@@ -76,7 +76,7 @@ class HalfList(NeighbourRows):
         self.constraints = constraints
         self.within_bodies = any(law.data.within_bodies for law in laws)
         self.solid = any(law.data.solid for law in laws)
-        self.bodies = tuple(law for law in laws if isinstance(law.data, HardBodies))
+        self.shaped = tuple(one for one in (*laws, *constraints) if isinstance(one.data, Shaped))
         self.laws, self.sizes = tuple(law for law in laws if law.data.reaches()), sizes
         self.spent = 1.0 - REACH_PART if self.laws else 1.0
         self.pace, self.moves, self.made = ti.field(ti.f64), ti.field(ti.i32), ti.field(ti.f64)
@@ -165,10 +165,11 @@ class HalfList(NeighbourRows):
     @ti.func
     def leaves_out(self, w, i, j, d, skin):
         left_out = False
-        for law in ti.static(self.bodies):
-            left_out = left_out or law.apart(self.s, w, i, j, d, skin[0])
         if ti.static(not self.within_bodies):
             left_out = self.joined(w, i, j)
+        for one in ti.static(self.shaped):
+            gap = skin[0] + ti.max(self.reach(w, i), self.reach(w, j))
+            left_out = left_out or one.apart(self.s, w, i, j, d, gap)
         return left_out
 
     @ti.func
@@ -210,6 +211,9 @@ class HalfList(NeighbourRows):
             # Two particles that move towards each other approach by twice the displacement. The smallest
             # radius is unknown in a list that was just lengthened and is about to be rebuilt.
             smallest = ti.cast(self.grid.smallest[w], ti.f64)
+            for one in ti.static(self.shaped):
+                # Bodies are thinner than the spheres around them.
+                smallest *= ti.cast(one.slenderness(w, 0), ti.f64)
             passing = smallest > 0.0 and step > smallest * smallest and self.s.count[w] > 1
         return passing
 

@@ -17,6 +17,7 @@ from tisim.errors import InputError, Words, abbreviated, must
 from tisim.materials.materials import Materials
 from tisim.packing.clump import Clump, clump_columns, sphere_columns
 from tisim.packing.tried_places import Packing
+from tisim.shapes.particle_shape import ParticleShape
 
 Arrays = dict[str, np.ndarray]
 """Particle quantities by field name: shape (n,) or (n, 3), SI."""
@@ -134,6 +135,55 @@ class Particles(Start):
             columns["position"] = np.where(joined, inside, columns["position"])
         core = {name: columns.pop(name) for name in ("position", "velocity", "radius", "mass")}
         return cls(**core, quantities=columns, material=materials)
+
+    @classmethod
+    def of_shapes(
+        cls,
+        shapes: ParticleShape | Sequence[ParticleShape],
+        position: Any,
+        density: float,
+        velocity: Any = (0.0, 0.0, 0.0),
+        orientation: Any = None,
+        angular_velocity: Any = (0.0, 0.0, 0.0),
+        shape: Any = 0,
+        size: Any = 1.0,
+        quantities: Mapping[str, Any] | None = None,
+        material: Any = None,
+    ) -> Self:
+        """Return particles with shapes, for a scene with an effect such as RigidRods.
+
+        shapes : the shapes of that effect, in its order. position : centres, m, shape (n, 3). density :
+        kg/m^3, from which masses follow by the volumes of the shapes. velocity : m/s, shape (n, 3).
+        orientation : quaternions w, x, y, z that rotate the shapes, shape (n, 4); random ones unless given.
+        angular_velocity : rad/s, in space, shape (n, 3). shape : index of the shape of each particle. size :
+        size of each particle over the size of its shape. quantities : further fields by name. Except for
+        the positions, one row may be given for all.
+        """
+        centres = np.asarray(position, float)
+        known = list(shapes) if isinstance(shapes, list | tuple) else [shapes]
+        n, right = len(centres), bool(known) and all(isinstance(one, ParticleShape) for one in known)
+        must(right, "particles.shapes", "shapes of tisim.shapes", Words(f"{shapes!r:.80}"))
+        kinds = _of_each("particles.shape", shape, n)
+        whole = kinds.dtype.kind in "iu" and bool(((kinds >= 0) & (kinds < len(known))).all())
+        must(whole, "particles.shape", f"indices of the {len(known)} shapes", shape)
+        must(density > 0, "particles.density", "greater than 0", density)
+        sizes = _of_each("particles.size", size, n).astype(float)
+        bounding, volume = (
+            np.array([getattr(one, name)() for one in known])[kinds] for name in ("bounding_radius", "volume")
+        )
+        spin = np.atleast_2d(np.asarray(angular_velocity, float))
+        columns = {"shape": kinds, "spin": _of_each("particles.angular_velocity", spin, n)}
+        if orientation is not None:
+            turns = _of_each("particles.orientation", np.atleast_2d(np.asarray(orientation, float)), n)
+            columns["orientation"] = turns
+        return cls(
+            position=centres,
+            velocity=_of_each("particles.velocity", np.atleast_2d(np.asarray(velocity, float)), n),
+            radius=sizes * bounding,
+            mass=density * volume * sizes**3,
+            material=material,
+            quantities={**columns, **(quantities or {})},
+        )
 
     # The comparison of pydantic would use the comparison of two arrays as a truth value.
     def __eq__(self, other: object) -> bool:

@@ -32,7 +32,8 @@ class EllipsoidShape(ParticleShape):
 
     def moments(self) -> np.ndarray:
         square = np.square(self.semi_axes)
-        moments: np.ndarray = (square.sum() - square) / 5
+        # Without differences, which would cancel for thin shapes.
+        moments: np.ndarray = (np.roll(square, -1) + np.roll(square, 1)) / 5
         return moments
 
     def half_extents(self) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.components.component import Component, Vector
+from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
 
 BISECTIONS = 60
@@ -65,6 +66,11 @@ class ParticleShape(Component):
         """Return the radius (m) of the sphere of the same volume."""
         return float(np.cbrt(0.75 * self.volume() / np.pi))
 
+    def contact_radius(self) -> float:
+        """Return the radius (m) of the sphere by which contact laws replace the shape at a point of contact;
+        by default the sphere of the same volume."""
+        return self.equal_volume_radius()
+
     def surface_points(self, count: int) -> np.ndarray:
         """Return points (m) on the surface, shape (count, 3), accurate to rounding.
 
@@ -86,5 +92,8 @@ class ParticleShape(Component):
 
 
 def positive(name: str, values: Vector) -> None:
-    """Raise InputError unless all components of a vector are greater than 0."""
+    """Raise InputError unless all components of a vector (m) are greater than 0 and within the limits of
+    lengths."""
     must(all(value > 0 for value in values), name, "three numbers greater than 0", values)
+    rule = f"three numbers from {LEAST:g} to {MOST:g} m"
+    must(all(LEAST <= value <= MOST for value in values), name, rule, values)

@@ -47,6 +47,10 @@ class SpherocylinderShape(ParticleShape):
     def bounding_radius(self) -> float:
         return self.length / 2 + self.radius
 
+    def contact_radius(self) -> float:
+        # The sphere that is swept along the segment touches at the same point.
+        return self.radius
+
     def support(self, direction: np.ndarray) -> np.ndarray:
         n = np.asarray(direction, float)
         farthest: np.ndarray = self.radius * n / np.linalg.norm(n, axis=-1, keepdims=True)

@@ -108,19 +108,12 @@ def closest_superquadrics(
 
 
 @ti.func
-def farthest_point(ellipsoids: ti.template(), direction, q, semi_axes, exponents):  # type: ignore[valid-type]
-    """Return the point of a superquadric that is farthest along a unit vector (m), relative to its centre.
-
-    ellipsoids : True if all exponents of a scene are 2; they are then not read. q : unit quaternion of the
-        orientation. semi_axes : m. exponents : from 2 to 20.
-    """
-    p = ti.cast(q, ti.f64)
-    n = rotated(conjugate(p), ti.cast(direction, ti.f64))
-    body = _constants(ellipsoids, ti.cast(semi_axes, ti.f64), ti.cast(exponents, ti.f64))
-    _height, x, _d, _v, _f = _support(ellipsoids, n, body)
-    point = 0.0 * direction
-    point = rotated(p, x)
-    return point
+def farthest_point(ellipsoids: ti.template(), direction, semi_axes, exponents):  # type: ignore[valid-type]
+    """Return the point (m, f64) of a superquadric that is farthest along a unit vector (f64), in the frame of
+    the body."""
+    a, g = ti.cast(semi_axes, ti.f64), ti.cast(exponents, ti.f64)
+    _h, x, _d, _v, _f = _support(ellipsoids, direction, _constants(ellipsoids, a, g))
+    return x
 
 
 @ti.func

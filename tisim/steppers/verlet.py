@@ -24,7 +24,7 @@ from tisim.steppers.common import (
     drift,
     rounding_fields,
 )
-from tisim.steppers.constraints import advance_bodies, kick_bodies, put_held, steer_held
+from tisim.steppers.constraints import advance_bodies, kick_bodies, offering, put_held, steer_held
 from tisim.steppers.context import Step, StepContext
 from tisim.steppers.step_control import ApproachTime, Controller, FixedStep
 from tisim.steppers.step_guard import STEP_EXCESS, STRAINED, check_step, guard_fields
@@ -93,6 +93,7 @@ class Move(PerParticle):
         self.domain, self.operators = context.domain, context.operators
         self.forced, self.turning = context.forced, context.turning
         self.constraints, self.guarded = context.constraints, FORCE_BEFORE in context.s.fields
+        self.turning_shapes = offering(context.constraints, "swept")
 
     @ti.func
     def run(self, w, i):
@@ -111,6 +112,9 @@ class Move(PerParticle):
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, end, dt)
         after, grown = s.position[w, i], ti.cast(s.radius[w, i] - size, ti.f64)
+        for constraint in ti.static(self.turning_shapes):
+            if constraint.holds(s, w, i):
+                grown = ti.abs(grown) + ti.cast(constraint.swept(s, w, i), ti.f64)
         path = after - before
         if ti.static(len(self.constraints) > 0):
             # A held particle may have been put through a periodic face already.

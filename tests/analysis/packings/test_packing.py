@@ -6,8 +6,8 @@ import pytest
 from tests.analysis.packings.lattices import lattice
 from tisim import Box, InputError, Open, Particles, Scene, run
 from tisim.analysis import PackedBodies, contact_numbers, near_gaps, packing_fraction, relative_gaps
-from tisim.effects import HardRods
-from tisim.shapes import SpherocylinderShape
+from tisim.effects import HardRods, RigidSuperquadrics
+from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.steppers import MechanicalContraction
 
 
@@ -36,6 +36,28 @@ def test_the_packing_at_the_end_of_a_contraction(rng):
     gaps = near_gaps(packing, 0.01)
     assert -1e-4 * (1 + 1e-9) <= relative_gaps(packing, gaps).min() < 1e-4
     assert contact_numbers(packing, [1e-4, 2e-4, 3e-4]).mean[0] > 1
+
+
+def test_bodies_that_move_under_contact_laws_have_their_shapes():
+    brick = SuperquadricShape(semi_axes=(1e-3, 2e-3, 3e-3), exponents=(6.0, 6.0, 6.0))
+    ball = SuperquadricShape(semi_axes=(1e-3, 1e-3, 1e-3), exponents=(2.0, 2.0, 2.0))
+    kinds, scale = np.array([0, 1, 0]), np.array([1.0, 0.5, 0.8])
+    bounding = np.array([brick.bounding_radius(), ball.bounding_radius()])
+    particles = Particles(
+        position=[[0.01, 0.01, 0.01], [0.02, 0.02, 0.02], [0.03, 0.03, 0.03]],
+        velocity=np.zeros((3, 3)),
+        mass=np.ones(3),
+        radius=scale * bounding[kinds],
+        shape=kinds,
+    )
+    bodies, box = RigidSuperquadrics(superquadrics=(brick, ball)), Box(low=(0, 0, 0), high=(0.04, 0.04, 0.04))
+    result = run(Scene(particles=particles, effects=[bodies], domain=box, duration=1e-9)).check()
+    packing = PackedBodies.from_result(result)
+    np.testing.assert_array_equal(packing.shape, kinds)
+    np.testing.assert_allclose(packing.scale, scale, rtol=1e-14)
+    np.testing.assert_array_equal(packing.orientation, result.state["orientation"])
+    expected = np.array([brick.volume(), ball.volume()])[kinds] * scale**3
+    np.testing.assert_allclose(packing.volumes(), expected, rtol=1e-14)
 
 
 def test_particles_without_shapes_are_spheres(rng):

@@ -410,7 +410,7 @@ def test_a_container_must_stay_long_enough_for_its_bodies():
 
 def test_superquadrics_are_refused_in_curved_containers():
     made = scene(CYLINDER)
-    rule = "effects.hard_ellipsoids must be rods or spheres in a cylindrical_container, as round ends touch"
+    rule = "effects.hard_superquadrics must be rods or spheres in a cylindrical_container, as round ends"
     with pytest.raises(InputError, match=rule):
         Scene(
             particles=made.particles,

@@ -10,22 +10,20 @@ from tests.shapes.pairs import Bodies, superquadric_contacts
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Gravity
 from tisim.effects.contact.hard_rods import HardRods
-from tisim.effects.contact.hard_superquadrics import HardEllipsoids, HardSuperquadrics
+from tisim.effects.contact.hard_superquadrics import HardSuperquadrics
 from tisim.engine.checkpoint import restore, save
-from tisim.shapes import EllipsoidShape, SpherocylinderShape, SuperquadricShape
+from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.steppers import FixedStep, Verlet
 from tisim.steppers.packing.mechanical_contraction import MechanicalContraction
 
 ROD, SPHERE = SpherocylinderShape(length=1.5, diameter=1.0), SpherocylinderShape(length=0.0, diameter=1.0)
-ELLIPSOID = EllipsoidShape(semi_axes=(0.5, 0.8, 1.2))
+ELLIPSOID = SuperquadricShape(semi_axes=(0.5, 0.8, 1.2), exponents=(2.0, 2.0, 2.0))
 CUBOID = SuperquadricShape(semi_axes=(0.8, 0.5, 1.0), exponents=(5.0, 3.0, 4.0))
 METHODS = ("revised", "original")
 
 
 def hard(shape):
     """The effect of hard bodies of one shape."""
-    if isinstance(shape, EllipsoidShape):
-        return HardEllipsoids(ellipsoids=(shape,))
     if isinstance(shape, SuperquadricShape):
         return HardSuperquadrics(superquadrics=(shape,))
     return HardRods(rods=(shape,))
@@ -258,6 +256,32 @@ def test_quaternions_and_shapes_of_a_start_are_checked():
         start = made.start() | {name: value}
         with pytest.raises(InputError, match=message):
             made.effects[0].check_start(start, made)
+
+
+def test_shapes_may_be_given_for_each_body():
+    kinds, shapes = np.arange(60) % 2, (ROD, SPHERE)
+    bounding = np.array([one.bounding_radius() for one in shapes])
+    made = scene(ROD, 60)
+    particles = Particles(
+        position=made.particles.position,
+        velocity=np.zeros((60, 3)),
+        mass=np.ones(60),
+        radius=0.5 * bounding[kinds],
+        shape=kinds,
+    )
+    both = Scene(
+        particles=particles,
+        effects=[HardRods(rods=shapes)],
+        domain=made.domain,
+        duration=3.0,
+        stepper=MechanicalContraction(),
+    )
+    np.testing.assert_array_equal(both.start()["shape"], kinds)
+    assert both.effects[0].unit_of(both.start()) == pytest.approx(0.5, rel=1e-12)
+    result = run(both).check()
+    growth = result.state["radius"] / particles.radius
+    np.testing.assert_array_equal(result.state["shape"], kinds)
+    np.testing.assert_allclose(growth, growth[0], rtol=1e-12)
 
 
 def test_orientations_of_a_start_are_random_unless_given():

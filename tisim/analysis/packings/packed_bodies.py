@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tisim.analysis.separations import with_images
 from tisim.domains.domain import Axes
-from tisim.effects.base import HardBodies
+from tisim.effects.base import Shaped
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.packing.region import ALL_AXES
@@ -83,7 +83,7 @@ class PackedBodies:
 
     @classmethod
     def from_result(cls, result: Result) -> Self:
-        """Return the packing at the end of a run: bodies of the hard bodies of its scene, or spheres of the
+        """Return the packing at the end of a run: bodies of the shapes of its scene, or spheres of the
         radii of the particles if it has none. InputError if the domain is not a box, or is sheared."""
         domain, state = result.scene.domain, result.state
         low, high = domain.bounds()
@@ -91,7 +91,7 @@ class PackedBodies:
         assert low is not None
         assert high is not None
         number = len(state["mass"])
-        bodies = [one for one in result.scene.effects if isinstance(one, HardBodies)]
+        bodies = [one for one in result.scene.effects if isinstance(one, Shaped)]
         if bodies:
             shapes = tuple(bodies[0].shapes())
             turns, kinds = state["orientation"], np.asarray(state["shape"], int)

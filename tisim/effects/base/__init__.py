@@ -42,8 +42,9 @@ A scene holds plain data; kernels hold bound objects (tisim/state/bound.py). All
    depends on the values of all other particles. A ``LongRange`` effect sums over all particles by other means
    than pairs, such as a tree of cells or waves. Its phases run before forces are summed, or in each sweep of
    a ``SelfConsistentQuantity``; its ``force`` or ``response`` reads the result from ``self.sum``.
-   ``HardBodies`` have shapes and exert no forces; packing steppers remove their overlaps, and those with the
-   walls of a ``Confinement``.
+   ``Shaped`` effects give particles shapes and orientations: ``HardBodies`` exert no forces, and packing
+   steppers remove their overlaps, and those with the walls of a ``Confinement``; ``RigidShapes`` move under
+   contact laws.
 8. An ``Operator`` changes the state between steps, and an ``AddsParticles`` also adds particles (see
    tisim/operators/base.py).
 9. A ``PairEvent`` changes two particles at once. It receives each pair in ``contact`` with exclusive access
@@ -88,6 +89,7 @@ from tisim.effects.base.long_range import LongRange, LongRangeSum
 from tisim.effects.base.pair_event import PairEvent
 from tisim.effects.base.pair_force import PairForce, keeps_apart, kinks
 from tisim.effects.base.pairwise import Pairwise
+from tisim.effects.base.shaped import Shaped
 from tisim.state.fields import Field, WorldField
 
 __all__ = [
@@ -105,6 +107,7 @@ __all__ = [
     "Pairwise",
     "SceneParts",
     "SelfConsistentQuantity",
+    "Shaped",
     "Vector",
     "WorldField",
     "keeps_apart",

@@ -122,6 +122,12 @@ class Constraint(Effect):
         return self.velocity(s, w, i, t)
 
     @ti.func
+    def swept(self, s, w, i):
+        """Return by how much (m) points of held particle i may have moved in a step by its rotation, if it is
+        not a sphere. It is called after ``advance``."""
+        return 0.0 * s.radius[w, i]
+
+    @ti.func
     def carried(self, s, w, i, vector, t, dt):
         """Return, at the end t (s, f64) of a step of dt (s), a vector that is fixed in the body of held
         particle i, given the vector at the beginning; in f64. It is called after ``velocity_midway``."""

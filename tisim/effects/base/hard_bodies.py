@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tisim.backend.taichi import ti
 from tisim.effects.base.confinement import confinement
 from tisim.effects.base.effect import SceneParts
 from tisim.effects.base.pairwise import Pairwise
+from tisim.effects.base.shaped import LENGTH_TOLERANCE, Shaped
 from tisim.errors import must
-from tisim.numerics.vectors import rotated
-from tisim.shapes.particle_shape import ParticleShape
-from tisim.state.fields import Field
-
-ORIENTATION = Field("orientation", "", 1, "keep", slots=4)
-"""Orientation of a body, a unit quaternion w, x, y, z from its body frame to space."""
-SHAPE = Field("shape", "", 1, "keep", integer=True, minimum=0.0)
-"""Index of the shape of a body."""
-LENGTH_TOLERANCE = 1e-6
-"""Tolerance of the length of the quaternions of a start; rounding in single precision is smaller."""
+from tisim.numerics.vectors import conjugate, rotated
 
 
-class HardBodies(Pairwise):
+class HardBodies(Shaped, Pairwise):
     """Hard bodies have shapes and orientations and may not overlap.
 
-    A body is a copy of its shape, enlarged such that its bounding sphere has the radius of the particle. It
-    exerts no force: a packing stepper moves and turns bodies until none overlap.
+    They exert no forces: a packing stepper moves and turns bodies until none overlap.
 
     unit : the shortest side D of the box around the first shape. Packing steppers measure lengths in it.
     round_ends : whether each body is the hull of spheres, its ends, so that it touches curved walls there.
@@ -38,38 +28,13 @@ class HardBodies(Pairwise):
     contract: ClassVar[bool] = True
     short_ranged: ClassVar = True
     memory: ClassVar[int] = 0
-    fields: ClassVar = (ORIENTATION, SHAPE)
     round_ends: ClassVar[bool] = False
 
-    def shapes(self) -> Sequence[ParticleShape]:
-        """Return the shapes; the field ``shape`` of a particle is an index into them."""
-        raise NotImplementedError
-
     def derived_rows(self) -> dict[str, list[float]]:
-        shapes = self.shapes()
-        moments = np.array([one.moments() for one in shapes])
-        return {
-            "bounding": [one.bounding_radius() for one in shapes],
-            "volume": [one.volume() for one in shapes],
-            "unit": [2 * float(shapes[0].half_extents().min())],
-            **{f"moment_{axis}": moments[:, k].tolist() for k, axis in enumerate("xyz")},
-        }
-
-    def given_at_start(self, start: Mapping[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
-        number, draw = len(start["mass"]), np.random.default_rng([seed, 0x0B0D])
-        given = {
-            SHAPE.name: np.zeros(number, int),
-            ORIENTATION.name: Rotation.random(number, rng=draw).as_quat(scalar_first=True),
-        }
-        return {name: values for name, values in given.items() if name not in start}
+        return {**super().derived_rows(), "unit": [2 * float(self.shapes()[0].half_extents().min())]}
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
-        lengths = np.linalg.norm(start[ORIENTATION.name], axis=1)
-        unit = bool((np.abs(lengths - 1) <= LENGTH_TOLERANCE).all())
-        must(unit, "particles.orientation", "unit quaternions", float(lengths.max(initial=1.0)))
-        last = int(start[SHAPE.name].max(initial=0))
-        shapes = self.shapes()
-        must(last < len(shapes), "particles.shape", f"below {len(shapes)}, the shapes", last)
+        self.check_shapes(start)
         around, sizes = confinement(scene), self.sizes(start)
         if around is not None and len(sizes):
             container = around.container
@@ -77,12 +42,6 @@ class HardBodies(Pairwise):
             equal = same or not any(container.scaled())
             rule = f"in one ratio to their shapes, as the {container.kind()} grows with them"
             must(equal, "particles.radius", rule, float(sizes.max() / sizes.min()))
-
-    def sizes(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the size of each body of a start over the size of its shape, shape (n,)."""
-        bounding = np.array([one.bounding_radius() for one in self.shapes()])
-        ratio: np.ndarray = start["radius"] / bounding[start[SHAPE.name]]
-        return ratio
 
     def unit_of(self, start: Mapping[str, np.ndarray]) -> float:
         """Return D (m) at a start."""
@@ -99,50 +58,30 @@ class HardBodies(Pairwise):
         must(known, f"effects.{around.label}.treatment", f"one for {self.kind()}", around.treatment)
 
     @ti.func
-    def size(self, s, w, i):
-        """Return the size of a body over the size of its shape."""
-        return s.radius[w, i] / self.bounding(w, s.shape[w, i])
-
-    @ti.func
-    def turn(self, s, w, i):
-        """Return the orientation of a body, a unit quaternion."""
-        return ti.Vector([s.orientation[w, i, k] for k in ti.static(range(4))])
-
-    @ti.func
     def spun(self, s, w, i, torque):
         """Return the inverse of the inertia tensor of a body times a torque.
 
         Both are in the units of packing steppers: masses in D^3 at density 1, lengths in D of the body.
         """
-        k, q, d = s.shape[w, i], self.turn(s, w, i), self.unit(w, 0)
-        square, mass = d * d, self.volume(w, k) / (d * d * d)
-        back = ti.Vector([q[0], -q[1], -q[2], -q[3]])
-        inside = rotated(back, torque)
-        inside[0] *= square / (mass * self.moment_x(w, k))
-        inside[1] *= square / (mass * self.moment_y(w, k))
-        inside[2] *= square / (mass * self.moment_z(w, k))
-        return rotated(q, inside)
+        q, length = self.turn(s, w, i), self.bounding(w, s.shape[w, i]) / self.unit(w, 0)
+        moments = self.mass(s, w, i) * length * length * self.inertia(s, w, i)
+        return rotated(q, rotated(conjugate(q), torque) / moments)
 
     @ti.func
     def mass(self, s, w, i):
         """Return the mass of a body in D^3 at density 1."""
         d = self.unit(w, 0)
-        return self.volume(w, s.shape[w, i]) / (d * d * d)
+        return self.shape_volume(w, s.shape[w, i]) / (d * d * d)
 
     @ti.func
     def closest(self, s, w, i, j, separation):
         """Return the gap between two bodies (m, negative if they overlap), the unit normal from i to j, and
-        the points of contact (m), each relative to the centre of its body.
+        the points of contact (m), each relative to the centre of its body. The gap of bodies that do not
+        overlap may be a lower bound, not below 0.
 
         separation : centre of j minus centre of i (m).
         """
-        return separation[0], separation, separation, separation
-
-    @ti.func
-    def apart(self, s, w, i, j, separation, gap):
-        """Return whether the gap between two bodies is wider than ``gap`` (m)."""
-        found, _normal, _here, _there = self.closest(s, w, i, j, separation)
-        return found > gap
+        return self.between(s, w, i, j, self.turn(s, w, i), self.turn(s, w, j), separation, 0.0)
 
     @ti.func
     def end_count(self, s, w, i):

@@ -18,8 +18,9 @@ class WallContacts(WallRing, WallSearch):
     """Wall contacts compute the forces of a bound wall on the grains that touch it.
 
     laws : each contact law with the position of its values in the history of a contact, and their number;
-    stride : the number of all values. kept : the state of the motion. The other attributes are the fields of
-    tisim/effects/walls/walls.py that hold the history on the grains.
+    stride : the number of all values. shapes : the shapes of particles that are ``shaped``; corners : the
+    number of points of a particle that touch a plane separately. kept : the state of the motion. The other
+    attributes are the fields of tisim/effects/walls/walls.py that hold the history on the grains.
     """
 
     if TYPE_CHECKING:
@@ -34,6 +35,9 @@ class WallContacts(WallRing, WallSearch):
         touched: Any
         clear: Any
         loads: Any
+        shaped: Any
+        shapes: Any
+        corners: Any
         resistance: Any
         touches_surfaces: Any
 
@@ -144,20 +148,48 @@ class WallContacts(WallRing, WallSearch):
         force, torque = ti.Vector.zero(s.real, 3), ti.Vector.zero(s.real, 3)
         distance = self.flat.distance(w, k, r)
         for law, first, size in ti.static(self.laws):
-            past, begin = ti.Vector.zero(s.real, max(1, size)), k * self.stride + first
-            for c in ti.static(range(size)):
-                past[c] = self.past[w, i, begin + c]
-            known = 0.0 * past
-            if distance <= self.reach(s, w, i):
-                outward = self.flat.direction(w, k)
-                now = self.motion.to_space(self.kept, w, outward, t)
-                before = self.moved_back(w, now, dt)
-                push, turn, known = self.touch(s, w, i, law, outward, before, distance, past, t, dt)
-                force, torque = force + push, torque + turn
-            if commit:
+            for corner in ti.static(range(self.corners)):
+                past = ti.Vector.zero(s.real, max(1, size))
+                begin = (k * self.corners + corner) * self.stride + first
                 for c in ti.static(range(size)):
-                    self.past[w, i, begin + c] = known[c]
+                    past[c] = self.past[w, i, begin + c]
+                known = 0.0 * past
+                if distance <= self.reach(s, w, i):
+                    outward = self.flat.direction(w, k)
+                    now = self.motion.to_space(self.kept, w, outward, t)
+                    before, push, turn = self.moved_back(w, now, dt), 0.0 * force, 0.0 * force
+                    if ti.static(self.shaped):
+                        push, turn, known = self.touch_corner(
+                            s, w, i, law, corner, now, before, distance, past, t, dt
+                        )
+                    else:
+                        push, turn, known = self.touch(s, w, i, law, outward, before, distance, past, t, dt)
+                    force, torque = force + push, torque + turn
+                if commit:
+                    for c in ti.static(range(size)):
+                        self.past[w, i, begin + c] = known[c]
         return force, torque
+
+    @ti.func
+    def touch_corner(self, s, w, i, law: ti.template(), corner, outward, before, distance, past, t, dt):  # type: ignore[valid-type]
+        """Return force (N), torque (N m) and history of a contact of one corner of a shape with a plane at a
+        ``distance`` (m) from the centre. ``outward`` is the normal of the plane in space, towards the
+        particles, ``before`` a step ago."""
+        normal, turning = -outward, self.motion.angular_velocity(w)
+        tilt = tilted(-before, normal)
+        x = self.shapes.corner(s, w, i, corner, self.shapes.turn(s, w, i), normal)
+        overlap, leant = x.dot(normal) - distance, (normal + tilt).normalized()
+        arm = x - 0.5 * overlap * normal
+        lever = self.shapes.corner(s, w, i, corner, self.shapes.midway(s, w, i, dt), leant)
+        lever -= 0.5 * overlap * leant
+        velocity = 0.0 * normal
+        if ti.static(self.motion.moves):
+            place = s.position[w, i] - 0.5 * dt * s.velocity[w, i] + lever
+            velocity = self.motion.velocity_at(self.kept, w, place, t - 0.5 * ti.cast(dt, ti.f64))
+        pair = law.wall_pair(s, w, i, self.wall_material)
+        return law.shape_at_wall(
+            s, w, i, arm, lever, normal, tilt, overlap, velocity, turning, pair, past, dt
+        )
 
     @ti.func
     def touch_surfaces(self, s, w, i, lately, number, found, t, dt, commit):

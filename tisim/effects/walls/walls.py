@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from tisim.components.component import Component, Text
 from tisim.domains.domain import Domain
-from tisim.effects.base import Effect, Field, Force, SceneParts, option
+from tisim.effects.base import Effect, Field, Force, SceneParts, Shaped, option
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.walls.motion import Fixed, Motion, MotionState, resultant, resultant_units
 from tisim.effects.walls.wall_contacts import WallContacts
@@ -148,7 +148,8 @@ class Walls(WallContacts, UsesMaterials, Force):
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
-        slots = {"past": Plane.list_capacity(len(self.planes)) * values, "loads": 6}
+        corners = max((one.corners for one in effects if isinstance(one, Shaped)), default=1)
+        slots = {"past": Plane.list_capacity(len(self.planes)) * corners * values, "loads": 6}
         if self.touches_surfaces:
             slots["surface_past"] = CONTACTS * (3 + values)
         if self.touches_surfaces or self.motion.moves:
@@ -161,12 +162,15 @@ class Walls(WallContacts, UsesMaterials, Force):
         for law in peers.of(GranularContact):
             laws.append((law, begin, law.data.memory))
             begin += law.data.memory
-        bound = peers.bound(self)
+        bound, moving = peers.bound(self), [one for one in peers.of(Shaped) if one.data.moves]
         surfaces = tuple(getattr(bound, name) for name in self.kinds_of_surface())
         faces = Faces(surfaces, bound.surface, self.surface is not None)
         return {
             "laws": tuple(laws),
             "stride": begin,
+            "shaped": bool(moving),
+            "shapes": moving[0] if moving else None,
+            "corners": moving[0].data.corners if moving else 1,
             "wall_material": self.material_index(self._materials),
             "flat": bound.planes,
             "has_planes": bool(self.planes),

@@ -177,8 +177,9 @@ class ScaleTwist(PerParticle):
 
     @ti.func
     def run(self, w, i):
-        s, unit = self.s, self.bodies.unit(w, 0)
-        moment = self.bodies.moment_x(w, s.shape[w, i]) / (unit * unit)
+        s, k = self.s, self.s.shape[w, i]
+        length = self.bodies.bounding(w, k) / self.bodies.unit(w, 0)
+        moment = length * length * self.bodies.moment_x(w, k)
         s.overlap_twist[w, i] = s.overlap_twist[w, i] / (self.stepper.inertia(w) * moment)
 
 

@@ -130,7 +130,7 @@ class TrialStates:
     move. Hard bodies read them as they read the state."""
 
     def __init__(self, s: State) -> None:
-        self.capacity = s.capacity
+        self.capacity, self.real = s.capacity, s.real
         self.radius, self.shape, self.orientation = ti.field(s.real), ti.field(ti.i32), ti.field(s.real)
         self.shift, self.turn = ti.Vector.field(3, s.real), ti.Vector.field(3, s.real)
         builder = Builder()

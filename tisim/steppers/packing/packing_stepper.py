@@ -92,7 +92,7 @@ def rotated_by(turn, orientation):
 def body_volume(s, bodies: ti.template(), w, i):  # type: ignore[valid-type]
     """Return the volume (m^3, f64) of a body."""
     size = ti.cast(bodies.size(s, w, i), ti.f64)
-    return ti.cast(bodies.volume(w, s.shape[w, i]), ti.f64) * size * size * size
+    return ti.cast(bodies.shape_volume(w, s.shape[w, i]), ti.f64) * size * size * size
 
 
 class SumVolumes(PerBlock):

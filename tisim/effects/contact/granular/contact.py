@@ -1,25 +1,28 @@
-"""The contract of contact laws between two spheres, and between a sphere and a wall."""
+"""The contract of contact laws between two particles, and between a particle and a wall."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, Field, PairForce
+from tisim.effects.base import Effect, Field, PairForce, Shaped
+from tisim.effects.contact.granular.shape_contact import ShapeContact
 from tisim.effects.contact.granular.spring import midway
 from tisim.effects.contact.granular.step_limit import TRAVEL, inverse_masses, wall_inverse_masses
 from tisim.materials.material_law import MaterialLaw
+from tisim.state.bound import Peers
 
 
-class GranularContact(MaterialLaw, PairForce):
+class GranularContact(ShapeContact, MaterialLaw, PairForce):
     """A granular contact law gives the force at the point of contact of a grain with another grain or a wall.
 
     The law depends only on the contact: its normal, overlap, materials, the relative velocity of its
     surfaces, and its history. The point of contact lies in the middle of the overlap, R_i - delta/2 from the
-    centre of i, and the force acts there. A wall is a grain of infinite radius and mass.
+    centre of i, and the force acts there. A wall is a grain of infinite radius and mass. In a scene whose
+    particles have shapes, normal, overlap and point of contact are theirs (shape_contact.py).
 
     memory : number of history values of a contact, kept while it lasts and zero when it begins.
     turns_springs : whether the history contains vectors, which rotate with the contact.
@@ -34,6 +37,7 @@ class GranularContact(MaterialLaw, PairForce):
     leapfrog: ClassVar[bool] = True
     guards_steps: ClassVar[bool] = True
     turns_springs: ClassVar[bool] = False
+    shaped: ClassVar[bool] = False
     # This step control limits the approach of surfaces, but ignores the stiffness of contacts.
     incompatible_controls = ("approach_time",)
 
@@ -42,6 +46,10 @@ class GranularContact(MaterialLaw, PairForce):
     ) -> None:
         """Raise InputError unless it can act between walls of a material and the particles of a start, or
         those that effects of the scene insert."""
+
+    def connect(self, peers: Peers) -> dict[str, Any]:
+        moving = [one for one in peers.of(Shaped) if one.data.moves]
+        return {"shaped": True, "shapes": moving[0]} if moving else {}
 
     def required_fields(self) -> tuple[str | Field, ...]:
         return (*self.fields, "material") if self.several else self.fields
@@ -67,6 +75,16 @@ class GranularContact(MaterialLaw, PairForce):
 
     @ti.func
     def interaction(self, s, w, i, j, separation, distance, past, dt, t):
+        force, here, there, known = 0.0 * separation, 0.0 * separation, 0.0 * separation, 0.0 * past
+        if ti.static(self.shaped):
+            force, here, there, known = self.between_shapes(s, w, i, j, separation, past, dt)
+        else:
+            force, here, there, known = self.between_spheres(s, w, i, j, separation, distance, past, dt)
+        return force, here, there, known
+
+    @ti.func
+    def between_spheres(self, s, w, i, j, separation, distance, past, dt):
+        """Return force, torques and history of two spheres, as ``interaction`` does."""
         a, b = s.radius[w, i], s.radius[w, j]
         overlap = a + b - distance
         arm = a - 0.5 * overlap
@@ -109,6 +127,14 @@ class GranularContact(MaterialLaw, PairForce):
         return 0.0 * s.radius[w, i]
 
     @ti.func
+    def wall_pair(self, s, w, i, material):
+        """Return the index of the pair of materials of i and of a wall of a material."""
+        pair = 0
+        if ti.static(self.several):
+            pair = s.material[w, i] * self.number_of_materials + material
+        return pair
+
+    @ti.func
     def at_wall(self, s, w, i, normal, tilt, overlap, velocity, turning, material, past, dt):
         """Return force and torque of a wall on i, and the contact history.
 
@@ -117,9 +143,7 @@ class GranularContact(MaterialLaw, PairForce):
         of the wall (rad/s). material : index of its material.
         """
         arm, radius = s.radius[w, i] - 0.5 * overlap, s.radius[w, i]
-        pair, spin = 0, s.spin[w, i]
-        if ti.static(self.several):
-            pair = s.material[w, i] * self.number_of_materials + material
+        pair, spin = self.wall_pair(s, w, i, material), s.spin[w, i]
         passing = velocity - s.velocity[w, i]
         slip = passing - (arm * spin).cross(normal)
         leant, turn = 0.0 * normal, 0.0 * arm

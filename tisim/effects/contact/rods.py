@@ -1,0 +1,54 @@
+"""Particles that are rods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.component import option
+from tisim.effects.base import Shaped
+from tisim.numerics.vectors import rotated
+from tisim.shapes.particle_shape import ParticleShape
+from tisim.shapes.rod_pairs import closest_rods
+from tisim.shapes.spherocylinder import SpherocylinderShape
+
+
+class Rods(Shaped):
+    """Particles are spherocylinders, or spheres, which are spherocylinders of length 0."""
+
+    contract: ClassVar[bool] = True
+
+    rods: tuple[SpherocylinderShape, ...] = option(
+        "the shapes of the rods", examples=[(SpherocylinderShape(length=4e-3, diameter=1e-3),)], min_length=1
+    )
+
+    def shapes(self) -> Sequence[ParticleShape]:
+        return self.rods
+
+    @ti.func
+    def axis(self, q):
+        """Return the unit vector along a rod of orientation q."""
+        return rotated(q, ti.Vector([0.0 * q[0], 0.0 * q[0], 1.0 + 0.0 * q[0]]))
+
+    @ti.func
+    def half(self, s, w, i):
+        """Return half the length (m) of the segment of a rod."""
+        return 0.5 * self.size(s, w, i) * self.rods.length(w, s.shape[w, i])
+
+    @ti.func
+    def rod_radius(self, s, w, i):
+        """Return the radius (m) of a rod."""
+        return 0.5 * self.size(s, w, i) * self.rods.diameter(w, s.shape[w, i])
+
+    @ti.func
+    def between(self, s, w, i, j, q_i, q_j, separation, far):
+        return closest_rods(
+            separation,
+            self.axis(q_i),
+            self.half(s, w, i),
+            self.rod_radius(s, w, i),
+            self.axis(q_j),
+            self.half(s, w, j),
+            self.rod_radius(s, w, j),
+        )

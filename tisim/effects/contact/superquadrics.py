@@ -1,0 +1,71 @@
+"""Particles that are superquadrics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from tisim.backend.taichi import ti
+from tisim.components.component import option
+from tisim.effects.base import Shaped
+from tisim.numerics.vectors import conjugate, rotated
+from tisim.shapes.particle_shape import ParticleShape
+from tisim.shapes.superquadric import SuperquadricShape
+from tisim.shapes.superquadric_pairs import closest_superquadrics, farthest_point
+
+
+class Superquadrics(Shaped):
+    """Particles are superquadrics: ellipsoids for exponents of 2, which approach boxes for large ones."""
+
+    contract: ClassVar[bool] = True
+
+    superquadrics: tuple[SuperquadricShape, ...] = option(
+        "the shapes of the superquadrics",
+        examples=[(SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3), exponents=(4.0, 4.0, 4.0)),)],
+        min_length=1,
+    )
+
+    def shapes(self) -> Sequence[ParticleShape]:
+        return self.superquadrics
+
+    @property
+    def ellipsoids(self) -> bool:
+        """Return whether all exponents are 2, for which kernels are simpler."""
+        return all(set(one.exponents) == {2.0} for one in self.superquadrics)
+
+    def structure(self) -> tuple[Any, ...]:
+        return (*super().structure(), self.ellipsoids)
+
+    @ti.func
+    def semi_axes(self, s, w, i):
+        """Return the semi-axes (m) of a superquadric."""
+        return self.size(s, w, i) * self.superquadrics.semi_axes(w, s.shape[w, i])
+
+    @ti.func
+    def exponents(self, s, w, i):
+        """Return the exponents of a superquadric."""
+        return self.superquadrics.exponents(w, s.shape[w, i])
+
+    @ti.func
+    def between(self, s, w, i, j, q_i, q_j, separation, far):
+        # The narrow phase is in f64 and returns its results in the precision of the separation.
+        gap, normal, here, there = closest_superquadrics(
+            self.ellipsoids,
+            ti.cast(separation, ti.f64),
+            q_i,
+            self.semi_axes(s, w, i),
+            self.exponents(s, w, i),
+            q_j,
+            self.semi_axes(s, w, j),
+            self.exponents(s, w, j),
+            far,
+        )
+        return ti.cast(gap, s.real), ti.cast(normal, s.real), ti.cast(here, s.real), ti.cast(there, s.real)
+
+    @ti.func
+    def farthest(self, s, w, i, q, direction):
+        """Return the point (m) of a superquadric that is farthest along a unit vector, relative to its
+        centre, for the orientation q."""
+        inside = ti.cast(rotated(conjugate(q), direction), ti.f64)
+        a, g = self.semi_axes(s, w, i), self.exponents(s, w, i)
+        return rotated(q, ti.cast(farthest_point(self.ellipsoids, inside, a, g), s.real))
