@@ -48,7 +48,7 @@ def test_bodies_that_move_under_contact_laws_have_their_shapes():
         velocity=np.zeros((3, 3)),
         mass=np.ones(3),
         radius=scale * bounding[kinds],
-        shape=kinds,
+        quantities={"shape": kinds},
     )
     bodies, box = RigidSuperquadrics(superquadrics=(brick, ball)), Box(low=(0, 0, 0), high=(0.04, 0.04, 0.04))
     result = run(Scene(particles=particles, effects=[bodies], domain=box, duration=1e-9)).check()

@@ -267,14 +267,14 @@ def test_shapes_may_be_given_for_each_body():
         velocity=np.zeros((60, 3)),
         mass=np.ones(60),
         radius=0.5 * bounding[kinds],
-        shape=kinds,
+        quantities={"shape": kinds},
     )
     both = Scene(
         particles=particles,
         effects=[HardRods(rods=shapes)],
         domain=made.domain,
-        duration=3.0,
-        stepper=MechanicalContraction(),
+        duration=30.0,
+        stepper=MechanicalContraction(method="original"),
     )
     np.testing.assert_array_equal(both.start()["shape"], kinds)
     assert both.effects[0].unit_of(both.start()) == pytest.approx(0.5, rel=1e-12)

@@ -25,7 +25,7 @@ from tisim.shapes.particle_shape import ParticleShape
 ANGULAR_MOMENTUM = Field("angular_momentum", "kg m^2/s", 3, "keep")
 ORIENTATION_BEFORE = Field("orientation_before", "", 1, "keep", slots=4, scratch=True)
 """The orientation at the beginning of a step."""
-DIRECTIONS = 500
+LEVER_DIRECTIONS = 500
 """Directions for which the lever of a shape is computed, in one octant; the largest is right to a percent."""
 
 
@@ -222,11 +222,11 @@ class RigidShapes(Shaped, Constraint):
 def lever(shape: ParticleShape) -> float:
     """Return the largest m r.K.r over all points r of the surface and all directions of a force there, with
     which a body of mass m answers a force by 1 + m r.K.r times the acceleration of its centre."""
-    z = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
-    angle = np.pi * (np.sqrt(5) - 1) * np.arange(DIRECTIONS)
+    z = (np.arange(LEVER_DIRECTIONS) + 0.5) / LEVER_DIRECTIONS
+    angle = np.pi * (np.sqrt(5) - 1) * np.arange(LEVER_DIRECTIONS)
     across = np.sqrt(1 - z * z)
     x = shape.support(np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1))
-    moments, zero = shape.moments(), np.zeros(DIRECTIONS)
+    moments, zero = shape.moments(), np.zeros(LEVER_DIRECTIONS)
     cross = np.array([[zero, -x[:, 2], x[:, 1]], [x[:, 2], zero, -x[:, 0]], [-x[:, 1], x[:, 0], zero]])
     cross = np.moveaxis(cross, 2, 0)
     answers = np.swapaxes(cross, 1, 2) @ (cross / moments[:, None])
