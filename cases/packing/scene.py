@@ -11,7 +11,7 @@ short ones.
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +37,6 @@ SIZES = {
     "default": Size(
         "200 bodies from a packing fraction of 0.1, 3000 attempts",
         {"number": 200, "start": 0.1, "step": 1.0, "attempts": 3000},
-        {},
     ),
     "paper": Size(
         "500 bodies from a packing fraction of 0.05, 100,000 attempts, as B16",
@@ -128,9 +127,7 @@ def of_shape(shape: ParticleShape, size: str, seed: int, **options: Any) -> Scen
     return scene(shape, seed=seed, **{**size_named(size, SIZES).scene, **options})
 
 
-Kind = Literal["rods", "ellipsoids", "superballs"]
-
-SCENES: Mapping[str, Callable[[str, int], Scene]] = {
+PACKING_SCENES: Mapping[str, Callable[[str, int], Scene]] = {
     "spheres": scene_for,
     "rods": partial(of_shape, rod(1.5)),
     "long-rods": partial(of_shape, rod(5.0), number=500),

@@ -47,7 +47,7 @@ and 200 spheres end at 0.602 in place of 0.610 with 3000."""
 
 
 @dataclass(frozen=True)
-class Row:
+class PackedRow:
     """A packing of a study: a line of its table. Lengths are in D; an angle is in degrees; NaN where it does
     not apply."""
 
@@ -69,7 +69,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PackedPlan:
     """The packings of a study: scenes that differ in shape, width, angle and xi, from several seeds."""
 
     study: Study
@@ -109,27 +109,29 @@ class Plan:
         return around.volume_in(np.ones(3), 1.0)
 
 
-def plans(study: Study) -> list[Plan]:
+def plans(study: Study) -> list[PackedPlan]:
     """Return the packings of a study."""
     if study == "aspect ratio":
-        return [Plan(study, one, method) for method in ("original", "revised") for one in ASPECTS]
+        return [PackedPlan(study, one, method) for method in ("original", "revised") for one in ASPECTS]
     if study == "cylinder":
-        return [Plan(study, one, width=width) for one in CONFINED_ASPECTS for width in WIDTHS]
+        return [PackedPlan(study, one, width=width) for one in CONFINED_ASPECTS for width in WIDTHS]
     if study == "wedge":
         return [
-            Plan(study, one, width=factor * WedgeContainer.shortest(np.radians(angle), one), angle=angle)
+            PackedPlan(
+                study, one, width=factor * WedgeContainer.shortest(np.radians(angle), one), angle=angle
+            )
             for one in CONFINED_ASPECTS
             for angle in ANGLES
             for factor in WEDGE_LENGTHS
         ]
     if study == "moment of inertia":
-        return [Plan(study, one, inertia=xi) for one in INERTIA_ASPECTS for xi in INERTIAS]
-    return [Plan(study, one, "revised") for one in EXPONENTS]
+        return [PackedPlan(study, one, inertia=xi) for one in INERTIA_ASPECTS for xi in INERTIAS]
+    return [PackedPlan(study, one, "revised") for one in EXPONENTS]
 
 
 def packed(
-    chosen: Sequence[Plan], size: str, starts: int, progress: Progress | None = None, **settings: Any
-) -> list[Row]:
+    chosen: Sequence[PackedPlan], size: str, starts: int, progress: Progress | None = None, **settings: Any
+) -> list[PackedRow]:
     """Return the packings of plans from random starts, packed as one batch."""
     usual = {**size_named(size, SIZES).scene, **settings}
     each = [(plan, seed) for plan in chosen for seed in range(starts)]
@@ -151,14 +153,14 @@ def packed(
     return [row(plan, seed, one) for (plan, seed), one in zip(each, packings(scenes, progress), strict=True)]
 
 
-def row(plan: Plan, seed: int, one: MeasuredPacking) -> Row:
+def row(plan: PackedPlan, seed: int, one: MeasuredPacking) -> PackedRow:
     """Return the line of a packing."""
     given = plan.study, plan.method, plan.shape, plan.width, plan.angle, plan.inertia, seed
     measures = one.fraction, one.contacts, one.held, one.nematic, one.cubatic
-    return Row(*given, len(one.bodies), one.attempts, *measures, aligned(plan, one))
+    return PackedRow(*given, len(one.bodies), one.attempts, *measures, aligned(plan, one))
 
 
-def aligned(plan: Plan, one: MeasuredPacking) -> float:
+def aligned(plan: PackedPlan, one: MeasuredPacking) -> float:
     """Return the part of the bodies near walls that are aligned with them; NaN without walls."""
     around = plan.container()
     if around is None:
@@ -168,25 +170,25 @@ def aligned(plan: Plan, one: MeasuredPacking) -> float:
     return wall_alignment(one.bodies, distance, normal).fraction
 
 
-def table(rows: Iterable[Row]) -> str:
+def table(rows: Iterable[PackedRow]) -> str:
     """Return rows as CSV."""
-    return csv_text([[one.name for one in fields(Row)], *(astuple(one) for one in rows)])
+    return csv_text([[one.name for one in fields(PackedRow)], *(astuple(one) for one in rows)])
 
 
-def read(text: str) -> list[Row]:
+def read(text: str) -> list[PackedRow]:
     """Return the rows of a table."""
     types: Mapping[str, Callable[[str], Any]] = {"str": str, "float": float, "int": int}
-    kinds = [types[getattr(one.type, "__name__", str(one.type))] for one in fields(Row)]
+    kinds = [types[getattr(one.type, "__name__", str(one.type))] for one in fields(PackedRow)]
     lines = list(csv.reader(io.StringIO(text)))[1:]
-    return [Row(*(kind(cell) for kind, cell in zip(kinds, line, strict=True))) for line in lines]
+    return [PackedRow(*(kind(cell) for kind, cell in zip(kinds, line, strict=True))) for line in lines]
 
 
-def load(path: Path) -> list[Row]:
+def load(path: Path) -> list[PackedRow]:
     """Return the rows of a file."""
     return read(path.read_text(encoding="utf-8"))
 
 
-def means(rows: Sequence[Row], by: Sequence[str], name: str) -> dict[tuple[Any, ...], Mean]:
+def means(rows: Sequence[PackedRow], by: Sequence[str], name: str) -> dict[tuple[Any, ...], Mean]:
     """Return the mean of a measure over seeds, by the values of columns."""
     groups: dict[tuple[Any, ...], list[float]] = {}
     for one in rows:

@@ -199,6 +199,8 @@ def _replace(path: Path, image: bytes) -> None:
 
 
 def recorded_fields(scene: Scene) -> tuple[Field, ...]:
-    """Return the fields in a trajectory of a scene: all except contact histories and scratch fields."""
+    """Return the fields in a trajectory of a scene: all except contact histories and scratch fields, unless a
+    field says otherwise."""
     fields = resolve_fields(needed_fields(scene.acting(), scene.stepper))
-    return tuple(field for field in fields if not (field.slots or field.scratch))
+    usual = {field: not (field.slots or field.scratch) for field in fields}
+    return tuple(field for field in fields if (usual[field] if field.recorded is None else field.recorded))

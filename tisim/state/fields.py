@@ -25,6 +25,8 @@ class Field:
     single precision.
     lookup : whether it belongs to the memory slot and not to its particle: it stays when particles are moved,
     inserted or removed.
+    recorded : whether frames of a trajectory have it; None for all fields that are neither ``scratch`` nor in
+    ``slots``, which are mostly contact histories.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Field:
     scratch: bool = False
     double: bool = False
     lookup: bool = False
+    recorded: bool | None = None
 
     def __post_init__(self) -> None:
         if self.slots and (self.merge != "keep" or self.components != 1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -15,6 +16,7 @@ from tisim.effects.base import Shaped
 from tisim.engine.result import Result
 from tisim.errors import must
 from tisim.packing.region import ALL_AXES
+from tisim.scene.scene import Scene
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.sphere import SphereShape
 
@@ -83,15 +85,21 @@ class PackedBodies:
 
     @classmethod
     def from_result(cls, result: Result) -> Self:
-        """Return the packing at the end of a run: bodies of the shapes of its scene, or spheres of the
-        radii of the particles if it has none. InputError if the domain is not a box, or is sheared."""
-        domain, state = result.scene.domain, result.state
+        """Return the packing at the end of a run; see ``from_state``."""
+        return cls.from_state(result.state, result.scene)
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, np.ndarray], scene: Scene) -> Self:
+        """Return the packing of a state of a scene, such as a frame: bodies of the shapes of the scene, or
+        spheres of the radii of the particles if it has none. InputError if the domain is not a box, or is
+        sheared."""
+        domain = scene.domain
         low, high = domain.bounds()
         must(low is not None and not domain.shears(), "domain", "a box that is not sheared", domain.label)
         assert low is not None
         assert high is not None
         number = len(state["mass"])
-        bodies = [one for one in result.scene.effects if isinstance(one, Shaped)]
+        bodies = [one for one in scene.effects if isinstance(one, Shaped)]
         if bodies:
             shapes = tuple(bodies[0].shapes())
             turns, kinds = state["orientation"], np.asarray(state["shape"], int)

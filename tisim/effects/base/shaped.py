@@ -15,7 +15,7 @@ from tisim.errors import must
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.state.fields import Field
 
-ORIENTATION = Field("orientation", "", 1, "keep", slots=4)
+ORIENTATION = Field("orientation", "", 1, "keep", slots=4, recorded=True)
 """Orientation of a body, a unit quaternion w, x, y, z from its body frame to space."""
 SHAPE = Field("shape", "", 1, "keep", integer=True, minimum=0.0)
 """Index of the shape of a body."""

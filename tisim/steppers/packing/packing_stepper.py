@@ -23,9 +23,9 @@ from tisim.steppers.packing.space import PackingSpace
 from tisim.steppers.step_control import SHORTEST_STEP, FixedStep
 
 ACCEPTED_FIELDS = (
-    Field("accepted_position", "m", 3, "keep", default="position"),
+    Field("accepted_position", "m", 3, "keep", default="position", recorded=False),
     Field("accepted_orientation", "", 1, "keep", slots=4),
-    Field("accepted_radius", "m", 1, "keep", default="radius"),
+    Field("accepted_radius", "m", 1, "keep", default="radius", recorded=False),
 )
 """The last configuration without overlaps; part of checkpoints, because a run may return to it."""
 PACKING_FIELDS = (WorldField("overlapping", "sum"), WorldField("growth", "real"))

@@ -1,0 +1,76 @@
+"""The case packing: its scenes, its table, its pictures."""
+
+import numpy as np
+import pytest
+
+from tisim import Recording, run
+from tisim.cases.packing.figures import of_cylinders, of_rods, pictures
+from tisim.cases.packing.measures import measured
+from tisim.cases.packing.scene import mixed, of_shape, rod
+from tisim.cases.packing.studies import PackedPlan, means, packed, plans, read, table
+from tisim.io.reader import frames
+from tisim.plotting.bodies import facets
+from tisim.shapes import EllipsoidShape, SuperquadricShape
+
+
+def test_sizes_of_a_mixture():
+    size = mixed(1000, 3.0, 0.7, seed=1)
+    assert (size**3).sum() == pytest.approx(1000)
+    large = size > size.min() * 1.5
+    assert size.max() / size.min() == pytest.approx(3.0)
+    assert (size[large] ** 3).sum() / 1000 == pytest.approx(0.7, abs=0.01)
+
+
+def test_a_mixture_is_denser_than_equal_spheres():
+    scenes = [
+        of_shape(rod(1.0), "small", 1, number=120, attempts=100, method="original", sizes=sizes)
+        for sizes in ((3.0, 0.7), None)
+    ]
+    dense, equal = (measured(result).fraction for result in run(scenes))
+    assert dense > equal + 0.02
+
+
+def test_rows_of_a_study():
+    """A table is read as it was written; a container is filled to the volume between its walls."""
+    free, narrow = plans("aspect ratio")[0], PackedPlan("cylinder", 1.0, width=1.1)
+    settings = {"attempts": 40, "number": 40, "step": 3.0}
+    rows = [*packed([free], "small", 2, **settings), *packed([narrow], "small", 1, **settings)]
+    assert table(read(table(rows))) == table(rows)
+    assert [one.seed for one in rows] == [0, 1, 0]
+    # Spheres in a file, at most in contact: pi/6 D^3 in pi/4 D_cyl^2 D.
+    assert 0.1 < rows[2].fraction < 1.05 * 2 / 3 / 1.1**2
+    assert 0.3 < rows[0].fraction < 0.66
+    (mean,) = means(rows[:2], ("shape",), "fraction").values()
+    assert mean.value == pytest.approx((rows[0].fraction + rows[1].fraction) / 2)
+    assert of_rods(rows[:2]).axes[0].get_ylabel() == "packing fraction"
+    assert of_cylinders(rows[2:]).axes[0].get_xlabel() == r"$D_{cyl}/D$"
+
+
+def test_the_picture_of_a_run(tmp_path):
+    scene = of_shape(rod(2.0), "small", 0, number=40, attempts=20, step=4.0)
+    run(scene, record=Recording(tmp_path / "packing.h5", frames=3))
+    with frames(tmp_path / "packing.h5") as trajectory:
+        figure = pictures(trajectory)["packing.png"]
+    (left, right) = figure.axes
+    assert left.collections
+    fractions = right.lines[0].get_ydata()
+    assert fractions[0] == pytest.approx(0.2)
+    assert fractions[-1] > fractions[0]
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        rod(3.0),
+        EllipsoidShape(semi_axes=(0.5, 0.7, 1.0)),
+        SuperquadricShape(semi_axes=(0.5, 0.7, 1.0), exponents=(4.0, 3.0, 5.0)),
+    ],
+)
+def test_facets_are_a_closed_surface_inside_the_shape(shape):
+    quads, outward = facets(shape)
+    assert shape.contains(quads * (1 - 1e-9)).all()
+    # The flux of r/3 through the surface is the volume.
+    across = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]) / 2
+    volume = np.abs(np.einsum("fk,fk->f", quads.mean(axis=1), across)).sum() / 3
+    assert 0.8 * shape.volume() < volume < shape.volume()
+    np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1)
