@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim.analysis.packings.gaps import near_gaps, relative_gaps
+from tisim.analysis.packings.orientational_order import random_nematic_order
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.packing.studies import PackedRow, means, packed, plans, table
@@ -31,6 +32,8 @@ MEASURED = (
 COLOURS = ("#4477aa", "#cc6677", "#228833", "#ccbb44", "#aa3377")
 LONG_LIMIT = 5.0
 """phi L/D of long rods (B16 Fig. 2.8)."""
+TICKS = (1, 1.5, 2, 3, 5, 10)
+"""Marked aspect ratios."""
 SPHERES = 0.64
 """Packing fraction of random close packing of spheres."""
 
@@ -106,11 +109,15 @@ def panels(rows: Sequence[PackedRow], x: str, xlabel: str, by: str, label: str) 
 
 
 def of_rods(rows: Sequence[PackedRow]) -> Figure:
-    """Draw rods in a periodic box by aspect ratio (B16 Figs 2.8 and 3.3)."""
+    """Draw rods in a periodic box by aspect ratio (B16 Figs 2.8 and 3.3), with lines at the density of random
+    close packing, and at the order of as many random directions."""
     figure = panels(rows, "shape", r"aspect ratio $\Lambda = L/D + 1$", "method", "{}")
     figure.axes[0].axhline(SPHERES, color="0.6", lw=0.8)
+    figure.axes[2].axhline(random_nematic_order(rows[0].number), color="0.6", lw=0.8)
     for axis in figure.axes:
         axis.set_xscale("log")
+        axis.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+        axis.set_xticks([], minor=True)
     return figure
 
 
