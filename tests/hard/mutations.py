@@ -86,11 +86,6 @@ SOFT_GRAINS = {
         "return 2.0 + 0.0 * self.superquadrics.exponents(w, s.shape[w, i])",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[cuboids]",
     ),
-    "confinement": (
-        "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
-        "tests/steppers/packing/test_confinement.py::"
-        "test_an_attempt_equals_its_reference[spherocylinder_shape-cylindrical_container-exact]",
-    ),
     "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{LAWS}[contact]"),
     "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{LAWS}[hertz]"),
     "contact_softening": (
@@ -151,6 +146,11 @@ MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
 STEPS = "tests/hard/test_granular_steps.py::test_steps_beyond_the_limit_stop_the_world"
 HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
 SHARED = {
+    "confinement": (
+        "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
+        "tests/steppers/packing/test_confinement.py::"
+        "test_an_attempt_equals_its_reference[spherocylinder_shape-cylindrical_container-exact]",
+    ),
     "corners_of_rods": (
         f"{MOTIONS}/rigid_rods.py", "self.rod_radius(s, w, i))", "0.99 * self.rod_radius(s, w, i))",
         f"{SHAPES}a_rod_falls_and_comes_to_rest_on_both_ends",

@@ -99,6 +99,7 @@ def test_bodies_of_a_start_do_not_overlap(shape, container):
     assert -1e-12 < min(least) < 0.3 * radius
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [ELLIPSOID, SUPERQUADRIC], ids=lambda one: one.kind())
 def test_superquadrics_of_a_start_do_not_overlap(shape):
     """By their kernel. Bounding spheres overlap, so these are not all that keeps bodies apart."""

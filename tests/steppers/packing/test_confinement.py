@@ -132,9 +132,13 @@ ATTEMPTS = [
 ]
 
 
+QUICK_ATTEMPTS = (ATTEMPTS[0], ATTEMPTS[3], ATTEMPTS[10])
+"""A rod by exact distances, a rod by virtual bodies, and a superquadric."""
+
+
 @pytest.mark.parametrize(
     ("shape", "container", "method", "treatment"),
-    ATTEMPTS,
+    [pytest.param(*one, marks=() if one in QUICK_ATTEMPTS else pytest.mark.slow) for one in ATTEMPTS],
     ids=[f"{shape.kind()}-{container.kind()}-{treatment}" for shape, container, _, treatment in ATTEMPTS],
 )
 def test_an_attempt_equals_its_reference(shape, container, method, treatment):
@@ -229,6 +233,7 @@ def test_energy_minimisation_packs_between_walls(container):
     assert overlap(result) <= TOLERANCE * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_both_treatments_move_spheres_alike():
     """For spheres the overlaps are equal up to rounding, unless they protrude by more than D/2."""
     states = []
@@ -354,6 +359,7 @@ def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     simulation.close()
 
 
+@pytest.mark.slow
 def test_a_resumed_packing_returns_to_its_last_configuration(tmp_path):
     made = scene(CYLINDER, SPHERE, attempts=60, volume_step=8.0, method="original", halvings=1)
     simulation = Simulation(made, 1)
@@ -400,6 +406,7 @@ def test_what_does_not_fit_is_refused():
         bodies.check_start(longer, made)
 
 
+@pytest.mark.slow
 def test_a_container_must_stay_long_enough_for_its_bodies():
     """A cylinder with few rods becomes shorter than two of them; its width does not count."""
     made = scene(CYLINDER, number=20, method="original", volume_step=2.0)

@@ -180,6 +180,7 @@ def test_rods_jam_at_a_higher_density_than_spheres():
     assert deepest(result.state, made.domain.high[0], shape, size) <= 1e-3 * RELATIVE
 
 
+@pytest.mark.slow
 def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     settings = {"fraction_step": 0.1, "precision": 0.03, "tolerance": 1e-3, "patience": 30}
     scenes = [scene(ROD, 100 + k, 0.3, seed=k, **settings) for k in range(3)]

@@ -174,7 +174,7 @@ def fraction(result, shape):
     [
         (SPHERE, "revised", 400),
         (SPHERE, "original", 400),
-        (ROD, "original", 400),
+        pytest.param(ROD, "original", 400, marks=pytest.mark.slow),
         pytest.param(ELLIPSOID, "revised", 50, marks=pytest.mark.slow),
     ],
 )

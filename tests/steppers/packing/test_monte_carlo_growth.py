@@ -124,6 +124,7 @@ def test_spheres_of_constant_size_are_a_fluid_of_hard_spheres():
     assert 2 * near / 400 / number == pytest.approx(expected, rel=0.03)
 
 
+@pytest.mark.slow
 def test_spheres_pack_at_random_close_packing():
     made = scene(SPHERE, 100, precision=4e-3)
     result, side = run(made), made.domain.high[0]

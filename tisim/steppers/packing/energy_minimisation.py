@@ -1,7 +1,5 @@
 """Random packings of hard bodies by minimising the energy of overlaps, with bisection of the density."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar
 

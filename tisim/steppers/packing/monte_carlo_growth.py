@@ -1,7 +1,5 @@
 """Random packings of hard bodies that grow while they move at random."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import sqrt
 from typing import Any, ClassVar

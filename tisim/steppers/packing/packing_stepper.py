@@ -1,8 +1,6 @@
 """The common part of the steppers that pack hard bodies: their attempts, and the last configuration without
 overlaps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
