@@ -23,6 +23,8 @@ from tisim.packing import random_bodies, wall_gaps
 from tisim.shapes import SpherocylinderShape
 from tisim.steppers import EnergyMinimisation, FixedStep, MechanicalContraction, Verlet
 
+pytestmark = pytest.mark.long
+
 CYLINDER, SPHERICAL = CylindricalContainer(diameter=4.0), SphericalContainer()
 WEDGE = WedgeContainer(length=7.0, angle=np.radians(35))
 SLIT = BoxContainer(hard=(True, False, True), width=(3.0, 0.0, 0.0))

@@ -11,6 +11,8 @@ from tisim.effects import Gravity, HardRods
 from tisim.engine.checkpoint import restore, save
 from tisim.steppers import EnergyMinimisation
 
+pytestmark = pytest.mark.long
+
 RELATIVE = 1 + 1e-9
 """Overlaps are recomputed in NumPy."""
 

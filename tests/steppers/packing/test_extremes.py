@@ -8,6 +8,8 @@ from tests.steppers.packing.test_mechanical_contraction import SPHERE
 from tisim import run
 from tisim.steppers import EnergyMinimisation, MechanicalContraction, MonteCarloGrowth
 
+pytestmark = pytest.mark.long
+
 TINY, HUGE = 1e-300, 1e300
 ENDS = {
     MechanicalContraction: {

@@ -17,6 +17,8 @@ from tisim.engine.checkpoint import restore, save
 from tisim.numerics.random_streams import TRIAL_MOVES
 from tisim.steppers import MonteCarloGrowth
 
+pytestmark = pytest.mark.long
+
 ROUNDING = 1e-12
 """Bodies in contact overlap by rounding, in D."""
 scene = partial(test_energy_minimisation.scene, stepper=MonteCarloGrowth)
