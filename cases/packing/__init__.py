@@ -11,8 +11,6 @@ CASE = Case(
     scene=scene_for,
     scenes=PACKING_SCENES,
     check=Late("tisim.cases.packing.checks", "check"),
-    quantities=Late("tisim.cases.packing.measures", "quantities"),
-    cost_size="small",
     pictures=Late("tisim.cases.packing.figures", "pictures"),
     figures=Late("tisim.cases.packing.figures", "figures"),
 )

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tisim import Result, Scene, run
-from tisim.accuracy import Quantity
 from tisim.analysis import Mean
 from tisim.analysis.packings.contact_numbers import contact_numbers
 from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
@@ -74,11 +73,3 @@ def grouped(
 def mean(group: Sequence[MeasuredPacking], name: str) -> Mean:
     """Return the mean of a measure over packings."""
     return Mean.of([getattr(one, name) for one in group])
-
-
-def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Return the quantities that 'tisim cost packing' compares."""
-    return (
-        Quantity("packing fraction", lambda result: measured(result).fraction, random=True),
-        Quantity("contact number", lambda result: measured(result).contacts, random=True),
-    )

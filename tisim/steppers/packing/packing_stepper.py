@@ -38,6 +38,8 @@ class Attempts(FixedStep):
     """A step is one attempt to remove the overlaps of a packing, and takes a time without physical
     meaning."""
 
+    accuracy_parameters = ()
+
     dt: float = parameter("s", "time of an attempt", 1.0, ge=SHORTEST_STEP)
 
 
