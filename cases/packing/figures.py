@@ -30,8 +30,6 @@ MEASURED = (
     ("nematic", "nematic order S"),
 )
 COLOURS = ("#4477aa", "#cc6677", "#228833", "#ccbb44", "#aa3377")
-LONG_LIMIT = 5.0
-"""phi L/D of long rods (B16 Fig. 2.8)."""
 TICKS = (1, 1.5, 2, 3, 5, 10)
 """Marked aspect ratios."""
 SPHERES = 0.64

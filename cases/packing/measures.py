@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tisim import Result, Scene, run
-from tisim.analysis import Mean
 from tisim.analysis.packings.contact_numbers import contact_numbers
 from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
 from tisim.analysis.packings.packed_bodies import PackedBodies
@@ -60,16 +59,3 @@ def volume_of(result: Result) -> float | None:
 def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[MeasuredPacking]:
     """Return the packings of scenes, packed as one batch; RunError if a run fails."""
     return [measured(result) for result in sound(run(list(scenes), progress))]
-
-
-def grouped(
-    scenes: Sequence[Sequence[Scene]], progress: Progress | None = None
-) -> list[list[MeasuredPacking]]:
-    """Return the packings of groups of scenes, packed as one batch."""
-    found = iter(packings([one for group in scenes for one in group], progress))
-    return [[next(found) for _ in group] for group in scenes]
-
-
-def mean(group: Sequence[MeasuredPacking], name: str) -> Mean:
-    """Return the mean of a measure over packings."""
-    return Mean.of([getattr(one, name) for one in group])

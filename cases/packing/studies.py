@@ -4,7 +4,6 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -23,8 +22,6 @@ from tisim.shapes.particle_shape import ParticleShape
 Study = Literal["aspect ratio", "cylinder", "wedge", "superballs", "moment of inertia"]
 ASPECTS = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0)
 """Aspect ratios Lambda of rods in a periodic box."""
-LONG_ASPECTS = (15.0, 25.0)
-"""Aspect ratios that need more bodies, because a box must be twice as wide as they are long."""
 CONFINED_ASPECTS = (1.0, 2.0, 3.0, 5.0)
 """Aspect ratios in a cylinder and a wedge."""
 WIDTHS = (1.1, 1.4, 1.7, 2.05, 2.3, 2.6, 3.0, 3.5, 4.5, 6.0, 8.0)
@@ -78,7 +75,6 @@ class PackedPlan:
     width: float = np.nan
     angle: float = np.nan
     inertia: float = 1.0
-    options: tuple[tuple[str, Any], ...] = ()
 
     def body(self) -> ParticleShape:
         """Return the shape of the bodies."""
@@ -142,14 +138,7 @@ def packed(
         options |= {"number": plan.number(usual["number"]), "container": plan.container()}
         if plan.container() is not None:
             options["start"] = CONFINED_START
-        scenes.append(
-            of_shape(
-                plan.body(),
-                size,
-                seed,
-                **{**settings, **options},
-            )
-        )
+        scenes.append(of_shape(plan.body(), size, seed, **{**settings, **options}))
     return [row(plan, seed, one) for (plan, seed), one in zip(each, packings(scenes, progress), strict=True)]
 
 
@@ -181,11 +170,6 @@ def read(text: str) -> list[PackedRow]:
     kinds = [types[getattr(one.type, "__name__", str(one.type))] for one in fields(PackedRow)]
     lines = list(csv.reader(io.StringIO(text)))[1:]
     return [PackedRow(*(kind(cell) for kind, cell in zip(kinds, line, strict=True))) for line in lines]
-
-
-def load(path: Path) -> list[PackedRow]:
-    """Return the rows of a file."""
-    return read(path.read_text(encoding="utf-8"))
 
 
 def means(rows: Sequence[PackedRow], by: Sequence[str], name: str) -> dict[tuple[Any, ...], Mean]:

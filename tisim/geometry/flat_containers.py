@@ -120,8 +120,8 @@ class WedgeContainer(Container):
 class BoxContainer(Container):
     """A box with hard faces along some axes, and periodic along the others.
 
-    Its faces are those of the box of the domain, which keep their places while bodies grow, unless a width is
-    given: this width keeps its ratio to D.
+    The faces of the domain are its walls, and keep their places while bodies grow. Along an axis with a given
+    width the walls are that far apart, and the width keeps its ratio to D.
     """
 
     hard: Axes = option("axes along which the box has hard faces", (True, True, True))

@@ -20,7 +20,7 @@ def test_contacts_of_lattices(name, cells):
     assert 2 * len(gaps.pairs) == CONTACTS[name] * len(packing)
     np.testing.assert_allclose(gaps.gap, 0, atol=1e-15)
     np.testing.assert_allclose(gaps.separation, 2e-3 * gaps.normal, atol=1e-15)
-    # Any orientation: shells of next neighbours too, as many as a large lattice has.
+    # Rotated lattices, and gaps to second neighbours: their number is compared with a large lattice.
     large = lattice(name, 5)
     edges = np.array([1.5, 2.3])
     expected = radial_distribution(large.position, edges, large.low, large.high, large.sides)

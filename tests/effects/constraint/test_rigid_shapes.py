@@ -297,8 +297,8 @@ def test_a_brick_comes_to_rest_on_its_largest_face():
 
 @pytest.mark.slow
 def test_a_rod_bounces_as_a_clump_of_spheres_of_the_same_body():
-    """17 spheres along a rod, with its mass and inertia. Their contacts are at the same places as long as an
-    end touches the floor; without damping, whose mass is m* for rods and that of the body for clumps."""
+    """17 spheres along a rod, with its mass and inertia. While an end touches the floor, both have the same
+    contact. There is no damping, because rods and clumps define its mass differently."""
     law = Granular(normal=HertzMaterial(), tangential=MindlinForce())
     lean = Rotation.from_rotvec([0.3, 0.9, 0]).as_quat(scalar_first=True)
     given = {"velocity": (0.2, 0, -0.5), "orientation": lean, "angular_velocity": (20, 10, -40)}

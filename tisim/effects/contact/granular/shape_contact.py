@@ -34,8 +34,8 @@ def leaning(before, normal):
 class ShapeContact:
     """A shape contact gives the force between two bodies, and between a body and a plane, by a contact law.
 
-    shapes : the bound effect that gives particles their shapes, with ``moves``. The other attributes are
-    those of the contact law.
+    shapes : the bound effect that gives particles their shapes, with ``moves``. The other attributes
+    come from the contact law.
     """
 
     if TYPE_CHECKING:
