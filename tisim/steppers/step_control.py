@@ -93,7 +93,7 @@ class FixedStep(Controller):
 
     dt: float = parameter("s", "length dt of a step", examples=[1e-6], ge=SHORTEST_STEP)
 
-    accuracy_parameters = (AccuracyParameter(dt=2),)
+    accuracy_parameters: ClassVar[tuple[AccuracyParameter, ...]] = (AccuracyParameter(dt=2),)
 
     def min_steps(self, duration: float) -> float:
         return duration / self.dt
