@@ -86,7 +86,7 @@ def of_rods(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     }
     spheres = periodic(rows, 1.0)
     yield Compared("packing fraction of spheres", "0.64; 0.61 (4.5)", text(spheres["fraction"]))
-    for method in dict.fromkeys(one.method for one in rows):
+    for method in dict.fromkeys(one.method for one in chosen(rows, shape=1.0)):
         both = [text(of(chosen(rows, shape=1.0, method=method), name)) for name in ("contacts", "touching")]
         subject = f"contact number of spheres, {method}"
         yield Compared(subject, "5.84 (4.5)", f"{both[0]} extrapolated, {both[1]} up to 1e-4 D")
@@ -98,7 +98,7 @@ def of_rods(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     yield Compared("largest S", "below 0.08 of 500 rods", here)
     aspects = [shape for shape in old if chosen(rows, shape=shape, method="revised")]
     for name, what in (("fraction", "packing fraction"), ("contacts", "contact number")):
-        for aspect in (aspects[0], aspects[-1]) if aspects else ():
+        for aspect in dict.fromkeys([*aspects[:1], *aspects[-1:]]):
             pair = [of(chosen(rows, shape=aspect, method=method), name) for method in ("revised", "original")]
             subject = f"{what}, revised less original, Lambda = {aspect:g}"
             published = "0" if name == "fraction" else "slightly above 0 for long rods"

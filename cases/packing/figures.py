@@ -7,14 +7,15 @@ from matplotlib.figure import Figure
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.packing import curves, snapshots
-from tisim.cases.packing.studies import PackedRow, Study, packed, plans, table
+from tisim.cases.packing.snapshots import Packing
+from tisim.cases.packing.studies import PackedRow, Study, measured_packings, plans, table
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, letters, plain
 
 STARTS = {"small": 2, "default": 3, "paper": 3}
 """Random starts of each packing, by size."""
-CYLINDER_STARTS = {"small": 2, "default": 5, "paper": 5}
+CYLINDER_STARTS = {"small": 2, "default": 3, "paper": 5}
 """Random starts of each packing in a cylinder."""
 DRAWN: tuple[Study, ...] = ("aspect ratio", "moment of inertia", "cylinder", "wedge", "superballs")
 
@@ -40,17 +41,13 @@ def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """rods.png, inertia.png, cylinder.png, wedge.png, superballs.png: densities, contacts and order; pictures
     of packings in cylinders.png, wedges.png and superball_packings.png; wedge_directions.png; and
     packings.csv with all packings of a size."""
-    parts = len(DRAWN) + len(snapshots.SNAPSHOTS) + 1
-    rows: dict[Study, list[PackedRow]] = {}
+    made: dict[Study, list[Packing]] = {}
     for k, study in enumerate(DRAWN):
-        rows[study] = packed(plans(study), size, starts_of(study, size), progress_of_part(progress, k, parts))
-    made: dict[str, Figure | str] = {**drawn(rows)}
-    for k, (name, (chosen, *layout)) in enumerate(snapshots.SNAPSHOTS.items(), len(DRAWN)):
-        columns, height = layout
-        made[name] = snapshots.snapshots(chosen, size, columns, height, progress_of_part(progress, k, parts))
-    last = progress_of_part(progress, parts - 1, parts)
-    made["wedge_directions.png"] = snapshots.wedge_directions(size, STARTS[size], last)
-    return {**made, "packings.csv": table(one for some in rows.values() for one in some)}
+        part = progress_of_part(progress, k, len(DRAWN))
+        found = measured_packings(plans(study), size, starts_of(study, size), part)
+        made[study] = [(row, one.bodies) for row, one in found]
+    rows = [row for some in made.values() for row, _ in some]
+    return {**drawn(made), "packings.csv": table(rows)}
 
 
 def starts_of(study: Study, size: str) -> int:
@@ -58,14 +55,26 @@ def starts_of(study: Study, size: str) -> int:
     return (CYLINDER_STARTS if study == "cylinder" else STARTS)[size]
 
 
-def drawn(rows: Mapping[Study, list[PackedRow]]) -> dict[str, Figure]:
-    """Return the figures of the curves of studies; rods in a periodic box are always among them."""
+def drawn(made: Mapping[Study, list[Packing]]) -> dict[str, Figure]:
+    """Return the figures of studies; rods in a periodic box are always among them."""
+    # Packings end in any order.
+    made = {study: sorted(some, key=lambda one: one[0].place()) for study, some in made.items()}
+    rows = {study: [row for row, _ in some] for study, some in made.items()}
     free = rows["aspect ratio"]
-    draw: Mapping[Study, tuple[str, Callable[[list[PackedRow]], Figure]]] = {
-        "aspect ratio": ("rods.png", lambda some: curves.of_rods([*some, *rows.get("long rods", [])])),
-        "moment of inertia": ("inertia.png", curves.of_inertia),
-        "cylinder": ("cylinder.png", lambda some: curves.of_cylinders(some, free)),
-        "wedge": ("wedge.png", lambda some: curves.of_wedges(some, free)),
-        "superballs": ("superballs.png", curves.of_superballs),
+    curves_of: Mapping[str, tuple[Study, Callable[[list[PackedRow]], Figure]]] = {
+        "rods.png": ("aspect ratio", lambda some: curves.of_rods([*some, *rows.get("long rods", [])])),
+        "inertia.png": ("moment of inertia", curves.of_inertia),
+        "cylinder.png": ("cylinder", lambda some: curves.of_cylinders(some, free)),
+        "wedge.png": ("wedge", lambda some: curves.of_wedges(some, free)),
+        "superballs.png": ("superballs", curves.of_superballs),
     }
-    return {name: made(rows[study]) for study, (name, made) in draw.items() if study in rows}
+    bodies_of: Mapping[str, tuple[Study, Callable[[list[Packing]], Figure]]] = {
+        "cylinders.png": ("cylinder", snapshots.in_cylinders),
+        "wedges.png": ("wedge", snapshots.in_wedges),
+        "wedge_directions.png": ("wedge", snapshots.wedge_directions),
+        "superball_packings.png": ("superballs", snapshots.of_superballs),
+    }
+    return {
+        **{name: draw(rows[study]) for name, (study, draw) in curves_of.items() if study in rows},
+        **{name: draw(made[study]) for name, (study, draw) in bodies_of.items() if study in made},
+    }

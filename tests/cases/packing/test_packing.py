@@ -34,7 +34,7 @@ def test_the_picture_of_a_run(tmp_path):
     run(scene, record=Recording(tmp_path / "packing.h5", frames=3))
     with frames(tmp_path / "packing.h5") as trajectory:
         figure = pictures(trajectory)["packing.png"]
-    (left, right) = figure.axes
+    left, right, _scale = figure.axes
     assert left.collections
     fractions = right.lines[0].get_ydata()
     assert fractions[0] == pytest.approx(0.2)

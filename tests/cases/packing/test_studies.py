@@ -8,7 +8,7 @@ from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.cases.packing.comparisons import compared, scaled, shortest_fraction
 from tisim.cases.packing.curves import of_cylinders, of_rods, of_superballs, of_wedges
 from tisim.cases.packing.scene import rod
-from tisim.cases.packing.snapshots import contact_counts, snapshots
+from tisim.cases.packing.snapshots import contact_counts, in_cylinders, in_wedges, wedge_directions
 from tisim.cases.packing.studies import (
     STUDIES,
     PackedPlan,
@@ -137,8 +137,8 @@ def test_wedges_beside_b16():
     assert line(found, "phi*, 9 degrees, Lambda = 3").startswith("1.0")
     assert line(found, "f_align, longest wedges, Lambda = 3").startswith("0.9")
     (first,) = of_wedges(rows, FREE).axes[0].lines[:1]
-    np.testing.assert_allclose(first.get_xdata(), [1, 3])
-    np.testing.assert_allclose(first.get_ydata(), [0, 1], atol=1e-6)
+    assert [float(one) for one in first.get_xdata()] == pytest.approx([1, 3])
+    assert [float(one) for one in first.get_ydata()] == pytest.approx([0, 1], abs=1e-6)
 
 
 def test_rods_and_superballs_beside_b16():
@@ -189,14 +189,31 @@ def test_contacts_of_a_row_of_spheres():
     assert contact_counts(bodies).tolist() == [1, 2, 2, 1]
 
 
-@pytest.mark.slow
 def test_pictures_of_packings():
-    chosen = [
-        PackedPlan("superballs", 3.0, "revised", number=30, limit=20, step=4.0),
-        PackedPlan("cylinder", 1.0, width=2.3, number=30, limit=20, step=4.0),
+    """Those of the first seeds, with the segment of a cylinder, and the directions in a wedge."""
+    plans_of = [
+        PackedPlan("cylinder", 1.0, width=2.3),
+        PackedPlan("wedge", 3.0, width=2 * shortest(3.0, 9.0), angle=9.0),
     ]
-    figure = snapshots(chosen, "small", 2, 3.0)
-    titles = [axis.get_title() for axis in figure.axes]
-    assert "gamma" in titles[0]
-    assert "cyl" in titles[1]
-    assert all(axis.collections for axis in figure.axes[:2])
+    made = [
+        (one, packing.bodies)
+        for one, packing in measured_packings(plans_of, "small", 1, number=30, attempts=20, step=4.0)
+    ]
+    figure = in_cylinders(made[:1])
+    assert "D_{cyl}" in figure.axes[0].get_title()
+    assert figure.axes[0].collections
+    assert "9°" in in_wedges(made[1:]).axes[0].get_title()
+    density = wedge_directions(made[1:]).axes[0].collections[0].get_array()
+    # Most rods lie along the bottom or the slope, within the first two bins of the azimuth.
+    assert density[:, :3].mean() > 2 * density[:, 3:].mean()
+
+
+def test_packings_are_sorted_by_plan_and_seed():
+    rows = [
+        row("cylinder", shape, seed, width=width)
+        for shape in (3.0, 1.0)
+        for width in (4.5, 2.3)
+        for seed in (1, 0)
+    ]
+    places = [(one.shape, one.width, one.seed) for one in sorted(rows, key=PackedRow.place)]
+    assert places == sorted(places)
