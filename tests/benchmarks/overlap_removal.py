@@ -90,18 +90,34 @@ METHODS = {
 
 def triples(number, generator):
     """Places (D) and orientations of triples of rods, each two of which overlap by up to DEEPEST."""
-    places, turns = np.zeros((0, 3, 3)), np.zeros((0, 3, 4))
-    while len(places) < number:
-        some = 40_000
-        near = generator.normal(size=(some, 3, 3))
-        near /= np.linalg.norm(near, axis=2, keepdims=True)
-        near *= ROD.length * np.cbrt(generator.uniform(size=(some, 3, 1)))
-        near[:, 0] = 0.0
-        tried = Rotation.random(3 * some, rng=generator).as_quat(scalar_first=True).reshape(some, 3, 4)
-        overlap = overlaps(near, tried)
-        good = ((overlap > 0.01 * DEEPEST) & (overlap < DEEPEST)).all(axis=1)
-        places, turns = np.concatenate([places, near[good]]), np.concatenate([turns, tried[good]])
-    return places[:number], turns[:number]
+    tried = 20_000
+    places, turns = candidates(tried, generator)
+    places[:, 2] = ROOM / 2
+    good = slight(overlaps(places, turns)[:, 0])
+    pairs, pair_turns = places[good, :2], turns[good, :2]
+    found, found_turns = np.zeros((0, 3, 3)), np.zeros((0, 3, 4))
+    while len(found) < number:
+        places, turns = candidates(tried, generator)
+        chosen = generator.integers(len(pairs), size=tried)
+        places[:, :2], turns[:, :2] = pairs[chosen], pair_turns[chosen]
+        good = slight(overlaps(places, turns)).all(axis=1)
+        found, found_turns = np.concatenate([found, places[good]]), np.concatenate([found_turns, turns[good]])
+    return found[:number], found_turns[:number]
+
+
+def candidates(number, generator):
+    """Three rods each: one at the origin, two at random places around it, in random directions."""
+    places = generator.normal(size=(number, 3, 3))
+    places /= np.linalg.norm(places, axis=2, keepdims=True)
+    places *= ROD.length * np.cbrt(generator.uniform(size=(number, 3, 1)))
+    places[:, 0] = 0.0
+    turns = Rotation.random(3 * number, rng=generator).as_quat(scalar_first=True)
+    return places, turns.reshape(number, 3, 4)
+
+
+def slight(overlap):
+    """Whether overlaps are small, but not too small to be followed."""
+    return (overlap > 0.01 * DEEPEST) & (overlap < DEEPEST)
 
 
 def overlaps(places, turns):
