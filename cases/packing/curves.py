@@ -27,6 +27,8 @@ MEASURED = (
 )
 TICKS = (1, 1.5, 2, 3, 5, 10, 25, 50, 100)
 """Marked aspect ratios."""
+FRACTIONS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
+"""Marked packing fractions of long rods."""
 SPHERES = 0.64
 """Packing fraction of random close packing of spheres."""
 Curve = Mapping[float, Mean]
@@ -73,8 +75,10 @@ def of_rods(rows: Sequence[PackedRow]) -> Figure:
     if longest > 8:
         aspect = np.geomspace(8.0, longest, 50)
         figure.axes[0].plot(aspect, CONTACTS_OF_RODS / 2 / (aspect - 1), color="0.6", lw=0.8, ls="--")
+        figure.axes[0].set_ylim(0.8 * min(one.fraction for one in rows), 1.0)
         figure.axes[0].set_yscale("log")
-        figure.axes[0].set_ylim(None, 1.0)
+        figure.axes[0].set_yticks(FRACTIONS, [f"{one:g}" for one in FRACTIONS])
+        figure.axes[0].set_yticks([], minor=True)
     number = {one.shape: one.number for one in rows}
     figure.axes[2].plot(
         list(number), [random_nematic_order(one) for one in number.values()], color="0.6", lw=0.8
