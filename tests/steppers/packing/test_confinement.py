@@ -405,7 +405,7 @@ def test_what_does_not_fit_is_refused():
             Scene(**{**parts, **change})
     longer = made.start() | {"radius": np.linspace(1.0, 1.1, 80)}
     with pytest.raises(InputError, match=r"particles.radius must be in one ratio to their shapes"):
-        bodies.check_start(longer, made)
+        around.check_start(longer, made)
 
 
 @pytest.mark.slow
