@@ -50,8 +50,9 @@ def of(rows: Sequence[PackedRow], name: str) -> Mean:
 
 def scaled(one: Mean, full: Mean, low: float = FEWEST_CONTACTS) -> Mean:
     """Return a mean as a part of the range from ``low`` to ``full``."""
-    none = Mean(low, 0.0)
-    return one.minus(none).over(full.minus(none))
+    span = full.value - low
+    part = (one.value - low) / span
+    return Mean(part, math.hypot(one.half, part * full.half) / span)
 
 
 def shortest_fraction(aspect: float, angle: float) -> float:
