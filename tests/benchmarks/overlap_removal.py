@@ -83,7 +83,6 @@ class RandomMotions(RemoveOverlaps):
 METHODS = {
     "original": (MechanicalContraction, {"method": "original"}),
     "revised": (MechanicalContraction, {"method": "revised"}),
-    "revised, motion 0.5": (MechanicalContraction, {"method": "revised", "motion": 0.5}),
     "random rotations": (RandomRemoval, {"directions": "turn"}),
     "random motions": (RandomRemoval, {"directions": "both"}),
 }
