@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from tisim.analysis import Mean
 from tisim.analysis.packings.orientational_order import random_nematic_order
 from tisim.cases.packing.comparisons import (
+    CONTACTS_IN_FILE,
     CONTACTS_OF_RODS,
-    FEWEST_CONTACTS,
     chosen,
     periodic,
     scaled,
@@ -131,7 +131,7 @@ def of_cylinders(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Figure
     label = r"$\Lambda$ = {:g}"
     aspects = sorted({one.shape for one in rows})
     of = {aspect: chosen(rows, shape=aspect) for aspect in aspects}
-    fraction, contacts, order, inverse = ({} for _ in range(4))  # type: ignore[var-annotated]
+    fraction, contacts, order, inverse = ({} for _ in range(4))
     for aspect, some in of.items():
         full = periodic(free, aspect)
         of_width: dict[str, dict[float, Mean]] = {
@@ -205,4 +205,4 @@ def wedge_fraction(one: Mean, full: Mapping[str, Mean], aspect: float, angle: fl
 
 def wedge_contacts(one: Mean, full: Mapping[str, Mean], *_: float) -> Mean:
     """Return C* of B16: 0 at two contacts, 1 at the periodic value."""
-    return scaled(one, full["contacts"], FEWEST_CONTACTS)
+    return scaled(one, full["contacts"], CONTACTS_IN_FILE)
