@@ -168,7 +168,7 @@ def plans(study: Study) -> list[PackedPlan]:
     if study == "long rods":
         # Starts and steps in proportion to the density at the end, which is about 5/Lambda.
         return [
-            PackedPlan(study, one, start=1.5 / one, step=0.4 * one * number / 200, limit=200, number=number)
+            PackedPlan(study, one, start=1.5 / one, step=0.4 * one * number / 200, limit=100, number=number)
             for one in LONG_ASPECTS
             for number in [PackedPlan(study, one).least_number(1)]
         ]
