@@ -9,7 +9,7 @@ from tisim.cases.packing.measures import measured
 from tisim.cases.packing.scene import mixed, of_shape, rod
 from tisim.cases.packing.studies import PackedPlan, means, packed, plans, read, table
 from tisim.io.reader import frames
-from tisim.plotting.bodies import facets
+from tisim.plotting.facets import facets
 from tisim.shapes import EllipsoidShape, SuperquadricShape
 
 
