@@ -74,9 +74,7 @@ def at_random(
 ) -> Scene:
     """Return a scene of bodies at random places, without overlaps."""
     start = random_bodies(shape, number, fraction, more.get("container"))
-    return packing(
-        hard(shape), start.position, start.box, stepper, orientation=start.orientation, **more
-    )
+    return packing(hard(shape), start.position, start.box, stepper, orientation=start.orientation, **more)
 
 
 def cube(volume: float) -> Box:

@@ -22,6 +22,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -173,11 +174,10 @@ def fire(most: int, turns: int) -> None:
         simulation.load([scene])
         simulation.run(steps=EVALUATIONS)
         peer = fire_by_lammps(scene)
-        ours, theirs = [], []
-        for _ in range(turns):
-            ours.append(used(lambda: simulation.run(steps=EVALUATIONS)))
-            theirs.append(used(lambda: peer.command(f"minimize 0 0 {EVALUATIONS} {EVALUATIONS}")))
-        ours, theirs = (1e6 * np.array(one) / EVALUATIONS / n for one in (ours, theirs))
+        command = f"minimize 0 0 {EVALUATIONS} {EVALUATIONS}"
+        own, other = partial(simulation.run, steps=EVALUATIONS), partial(peer.command, command)
+        pairs = np.array([(used(own), used(other)) for _ in range(turns)])
+        ours, theirs = 1e6 / EVALUATIONS / n * pairs.T
         energies = float(simulation.s.read("fire_energy")[0]) / n, peer.get_thermo("pe") / n
         cells = spread(ours), spread(theirs), spread(theirs / ours), *(f"{one:.3g}" for one in energies)
         print(f"| {n:,} | {' | '.join(cells)} |", flush=True)

@@ -10,7 +10,14 @@ from tests.numerics.test_philox import reference
 from tests.steppers.packing import test_energy_minimisation
 from tests.steppers.packing.bits import same_bits
 from tests.steppers.packing.test_energy_minimisation import axes_of, pair, width
-from tests.steppers.packing.test_mechanical_contraction import CUBOID, ELLIPSOID, ROD, SPHERE, deepest, fraction
+from tests.steppers.packing.test_mechanical_contraction import (
+    CUBOID,
+    ELLIPSOID,
+    ROD,
+    SPHERE,
+    deepest,
+    fraction,
+)
 from tisim import InputError, Scene, Simulation, run
 from tisim.effects import Gravity
 from tisim.numerics.random_streams import TRIAL_MOVES

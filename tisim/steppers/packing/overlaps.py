@@ -99,8 +99,8 @@ class BodySum(PairSum):
 
 
 class MotionSum(BodySum):
-    """Base of the sums that set push and twist of each body, and ``further`` columns: sums, of which the last is a
-    maximum."""
+    """Base of the sums that set push and twist of each body and its ``further`` fields, the last of which is
+    a maximum."""
 
     further: ClassVar[tuple[Field, ...]]
 

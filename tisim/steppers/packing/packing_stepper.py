@@ -52,8 +52,8 @@ class PackingStepper(Stepper):
     """Packing steppers bring hard bodies together in a periodic box of constant size: the bodies grow.
 
     The phases of a step end with ``BeginStep``, a subclass of ``MoveBodies``, ``CheckWidth`` and ``Advance``.
-    Before these, a step sets ``growth`` of the world. The counter ``jammed`` of the result is 1 if a world has
-    ended because its bodies could not be brought closer, and 0 if its duration was reached first.
+    Before these, a step sets ``growth`` of the world. The counter ``jammed`` of the result is 1 if a world
+    has ended because its bodies could not be brought closer, and 0 if its duration was reached first.
 
     confines : whether bodies may be packed between walls.
     """
