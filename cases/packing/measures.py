@@ -1,29 +1,35 @@
 """Measures of packings, and many packings as one batch."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from tisim import Result, Scene, run
+from tisim import Result, Scene
 from tisim.analysis.packings.contact_numbers import contact_numbers
+from tisim.analysis.packings.gaps import near_gaps
 from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.common.runs import sound
 from tisim.effects import Confinement
-from tisim.engine.batches import Progress
+from tisim.engine.batches import Batches, Progress
+
+CUTOFF = 1e-4
+"""Gap (D) up to which bodies are in contact in B16 chapters 3 and 4."""
 
 
 @dataclass(frozen=True)
 class MeasuredPacking:
     """A packing and its measures.
 
-    fraction : packing fraction. contacts : mean contact number. held : mean contact number of bodies that are
-    not rattlers. nematic : S of the axes z. cubatic : S4. attempts : of the run.
+    fraction : packing fraction. contacts : mean contact number, extrapolated to contact (B16 2.2.5).
+    touching : mean number of bodies within CUTOFF (B16 3.3). held : ``contacts`` of bodies that are not
+    rattlers. nematic : S of the axes z. cubatic : S4. attempts : of the run.
     """
 
     bodies: PackedBodies
     fraction: float
     contacts: float
+    touching: float
     held: float
     nematic: float
     cubatic: float
@@ -39,6 +45,7 @@ def measured(result: Result) -> MeasuredPacking:
         bodies=bodies,
         fraction=packing_fraction(bodies, volume_of(result)),
         contacts=numbers.at_contact.value,
+        touching=2 * len(near_gaps(bodies, CUTOFF * float(bodies.diameters().max())).pairs) / len(bodies),
         held=numbers.held_at_contact.value,
         nematic=nematic_order(axes[:, 2]).order,
         cubatic=cubatic_order(bodies).order,
@@ -56,6 +63,13 @@ def volume_of(result: Result) -> float | None:
     return around[0].container.volume_in(side, float(bodies.diameters()[0]))
 
 
-def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[MeasuredPacking]:
-    """Return the packings of scenes, packed as one batch; RunError if a run fails."""
-    return [measured(result) for result in sound(run(list(scenes), progress))]
+def packings(
+    scenes: Sequence[Scene], progress: Progress | None = None, together: int = 256
+) -> Iterator[tuple[int, MeasuredPacking]]:
+    """Yield (index into scenes, packing) as the packings end; RunError if a run fails.
+
+    together : largest number of packings that are made side by side.
+    """
+    for index, result in Batches(together).run(scenes, progress):
+        (result,) = sound([result])
+        yield index, measured(result)

@@ -35,8 +35,8 @@ SIZES = {
         {"number": 60, "start": 0.2, "step": 2.0, "attempts": 200, "halvings": 3},
     ),
     "default": Size(
-        "200 bodies from a packing fraction of 0.1, 3000 attempts",
-        {"number": 200, "start": 0.1, "step": 1.0, "attempts": 3000},
+        "200 bodies from a packing fraction of 0.1, 2000 attempts",
+        {"number": 200, "start": 0.1, "step": 1.0, "attempts": 2000},
     ),
     "paper": Size(
         "500 bodies from a packing fraction of 0.05, 100,000 attempts, as B16",

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from tisim import Recording, run
-from tisim.cases.packing.figures import of_cylinders, of_rods, pictures
+from tisim.cases.packing.figures import pictures
 from tisim.cases.packing.measures import measured
 from tisim.cases.packing.scene import mixed, of_shape, rod
-from tisim.cases.packing.studies import PackedPlan, means, packed, plans, read, table
+from tisim.io import run_folder
 from tisim.io.reader import frames
-from tisim.plotting.bodies import facets
+from tisim.plotting.facets import facets
+from tisim.plotting.time_series import clouds
 from tisim.shapes import EllipsoidShape, SuperquadricShape
 
 
@@ -30,32 +31,27 @@ def test_a_mixture_is_denser_than_equal_spheres():
     assert dense > equal + 0.02
 
 
-def test_rows_of_a_study():
-    """A table is read as it was written; a container is filled to the volume between its walls."""
-    free, narrow = plans("aspect ratio")[0], PackedPlan("cylinder", 1.0, width=1.1)
-    settings = {"attempts": 40, "number": 40, "step": 3.0}
-    rows = [*packed([free], "small", 2, **settings), *packed([narrow], "small", 1, **settings)]
-    assert table(read(table(rows))) == table(rows)
-    assert [one.seed for one in rows] == [0, 1, 0]
-    # Spheres in a file, at most in contact: pi/6 D^3 in pi/4 D_cyl^2 D.
-    assert 0.1 < rows[2].fraction < 1.05 * 2 / 3 / 1.1**2
-    assert 0.3 < rows[0].fraction < 0.66
-    (mean,) = means(rows[:2], ("shape",), "fraction").values()
-    assert mean.value == pytest.approx((rows[0].fraction + rows[1].fraction) / 2)
-    assert of_rods(rows[:2]).axes[0].get_ylabel() == "packing fraction"
-    assert of_cylinders(rows[2:]).axes[0].get_xlabel() == r"$D_{cyl}/D$"
-
-
-def test_the_picture_of_a_run(tmp_path):
+def test_the_pictures_of_a_run(tmp_path):
+    """Bodies are drawn by their shapes, and bars count all of them; an ended packing lacks no frames."""
     scene = of_shape(rod(2.0), "small", 0, number=40, attempts=20, step=4.0)
-    run(scene, record=Recording(tmp_path / "packing.h5", frames=3))
-    with frames(tmp_path / "packing.h5") as trajectory:
-        figure = pictures(trajectory)["packing.png"]
-    (left, right) = figure.axes
+    record = Recording(tmp_path / "trajectory.h5", frames=3)
+    result = run(scene, record=record)
+    with frames(record.path) as trajectory:
+        assert trajectory.missing
+    run_folder.write_result(result, tmp_path / "result.h5")
+    for name in ("trajectory.h5", "result.h5"):
+        with frames(tmp_path / name) as trajectory:
+            assert not trajectory.missing
+            figure = pictures(trajectory)["packing.png"]
+            start, _end = clouds(trajectory).axes
+    left, right = figure.axes
     assert left.collections
-    fractions = right.lines[0].get_ydata()
-    assert fractions[0] == pytest.approx(0.2)
-    assert fractions[-1] > fractions[0]
+    assert sum(bar.get_height() for bar in right.patches) == 40
+    assert right.get_title(loc="left") == f"(b) packing fraction {measured(result).fraction:.3f}"
+    (drawn,) = start.collections
+    assert len(drawn.get_paths()) > 40 * 20
+    assert not start.images
+    assert start.get_title(loc="left").startswith("(a) start, t = 0 s: 40 bodies, mean bounding radius 1 m")
 
 
 @pytest.mark.parametrize(
