@@ -37,6 +37,9 @@ from tisim.steppers.packing.packing_stepper import (
 from tisim.steppers.packing.space import CheckWidth, PackingSpace
 from tisim.steppers.verlet import Advance
 
+MEETING_AXES = 1e-6
+"""The least distance of two axes that the original method assumes, over the sum of the radii."""
+
 
 class MechanicalContraction(PackingStepper):
     """Mechanical contraction packs hard bodies: it contracts the system until overlaps remain.
@@ -101,10 +104,15 @@ class MechanicalContraction(PackingStepper):
 
     @ti.func
     def weight(self, depth):
-        """Return the weight of an overlap (D) in the sums of a body."""
+        """Return the weight of an overlap in the sums of a body: in the original method the product of the
+        overlap and the distance of the axes, both over the sum of the radii.
+
+        depth : overlap over the sum of the radii.
+        """
         weight = 0.0 * depth + 1.0
         if ti.static(self.method == "original"):
-            weight = depth * (1.0 - depth)
+            # Axes that meet have a distance too, for otherwise nothing would move them apart.
+            weight = depth * ti.max(1.0 - depth, MEETING_AXES)
         return weight
 
     def step(self, context: StepContext) -> Step:
@@ -140,19 +148,21 @@ class ChooseAction(Phase):
             s.volume_decrease[w] = ti.cast(self.stepper.volume_step(w), ti.f64)
         last = s.end[w] - s.time[w] <= ti.cast(1.5, ti.f64) * ti.cast(self.control.dt(w), ti.f64)
         volume, ends = s.box_volume[w], False
+        given_up = s.attempted[w] >= self.stepper.attempts and s.contractions[w] > 0
         s.packing_action[w] = MOVE
         if s.overlapping[w] == 0:
             s.packing_action[w] = CONTRACT
             s.contractions[w] += 1
             s.attempted[w] = 0
-        elif (s.attempted[w] >= self.stepper.attempts and s.contractions[w] > 0) or last:
+        elif given_up or last:
             s.packing_action[w] = RETURN
             # The last contraction is taken back.
             volume += s.volume_decrease[w]
             s.attempted[w] = 0
             s.halved[w] += 1
             s.volume_decrease[w] = 0.5 * s.volume_decrease[w]
-            ends = s.halved[w] > self.stepper.halvings or last
+            s.jammed[w] = ti.cast(given_up and s.halved[w] > self.stepper.halvings, ti.i64)
+            ends = last or s.jammed[w] == 1
             if s.contractions[w] == 0:
                 # There is no configuration without overlaps to return to.
                 s.fail(w, WorldStatus.OVERLAPPING, 0)
@@ -161,7 +171,9 @@ class ChooseAction(Phase):
         s.growth[w] = 1.0
         if s.packing_action[w] != MOVE:
             s.box_volume[w] = volume
-            if not ends and not (last and s.packing_action[w] == CONTRACT):
+            if not (ends or last):
+                # Half of the volume remains, also after a step that is longer than the box.
+                s.volume_decrease[w] = ti.min(s.volume_decrease[w], 0.5 * volume)
                 s.box_volume[w] = volume - s.volume_decrease[w]
                 s.growth[w] = self.space.growth(volume, s.box_volume[w])
         if ends:
