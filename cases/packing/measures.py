@@ -4,13 +4,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tisim import Result, Scene, run
+from tisim.accuracy import Quantity
 from tisim.analysis.packings.contact_numbers import contact_numbers
+from tisim.analysis.packings.gaps import near_gaps, relative_gaps
 from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.common.runs import sound
 from tisim.effects import Confinement
 from tisim.engine.batches import Progress
+
+CONTACT_GAP = 1e-3
+"""Gap (D) up to which bodies count as touching where protocols are compared. Some leave overlaps of up to
+1e-4 D between touching bodies, others gaps as wide as their last trial moves."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,32 @@ def volume_of(result: Result) -> float | None:
     bodies = PackedBodies.from_result(result)
     side = bodies.high - bodies.low
     return around[0].container.volume_in(side, float(bodies.diameters()[0]))
+
+
+def mean_contacts(result: Result) -> float:
+    """Return the mean contact number: contacts have gaps of at most CONTACT_GAP, whatever the protocol."""
+    bodies = PackedBodies.from_result(result)
+    gaps = near_gaps(bodies, float(CONTACT_GAP * bodies.diameters().max()))
+    return 2 * int((relative_gaps(bodies, gaps) <= CONTACT_GAP).sum()) / len(bodies)
+
+
+def fraction_of(result: Result) -> float:
+    """Return the packing fraction."""
+    return packing_fraction(PackedBodies.from_result(result), volume_of(result))
+
+
+def order_of(result: Result) -> float:
+    """Return the nematic order S of the axes z."""
+    return nematic_order(PackedBodies.from_result(result).axes()[:, 2]).order
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``, over random starts."""
+    return (
+        Quantity("packing fraction", fraction_of, random=True),
+        Quantity("contact number", mean_contacts, random=True),
+        Quantity("nematic order", order_of, random=True),
+    )
 
 
 def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[MeasuredPacking]:

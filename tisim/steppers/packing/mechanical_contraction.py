@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, HardBodies, SceneParts
 from tisim.errors import must
@@ -75,6 +76,13 @@ class MechanicalContraction(PackingStepper):
         "D^2", "xi over the moment of inertia of a body of mass 1, of the original method", 1.0, gt=0
     )
 
+    # Packings end at a density that depends on all of these, however fine one of them is.
+    accuracy_parameters: ClassVar = (
+        AccuracyParameter(attempts=-1, converges=False),
+        AccuracyParameter(volume_step=1, converges=False),
+        AccuracyParameter(tolerance=1, converges=False),
+        AccuracyParameter(motion=1, converges=False),
+    )
     world_fields: ClassVar = (
         *PACKING_FIELDS,
         *ATTEMPT_FIELDS,
