@@ -1,7 +1,7 @@
 """Random packings of spheres, rods, ellipsoids and superballs (B16 chapters 2 to 4)."""
 
 from tisim.cases.case import Case, Late
-from tisim.cases.packing.scene import COST, PACKING_SCENES, SIZES, TITLE, scene_for
+from tisim.cases.packing.scene import PACKING_SCENES, SIZES, TITLE, scene_for
 
 CASE = Case(
     name="packing",
@@ -14,7 +14,7 @@ CASE = Case(
     problem=Late("tisim.cases.packing.problem", "problem"),
     variants=("densest", "superquadrics", "permeable"),
     quantities=Late("tisim.cases.packing.measures", "quantities"),
-    cost_size=COST,
+    cost_size="small",
     pictures=Late("tisim.cases.packing.figures", "pictures"),
     figures=Late("tisim.cases.packing.figures", "figures"),
 )

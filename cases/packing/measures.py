@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from tisim import Result, Scene, run
 from tisim.accuracy import Quantity
+from tisim.analysis.packings.bond_order import bond_order, contact_bonds
 from tisim.analysis.packings.contact_numbers import contact_numbers
 from tisim.analysis.packings.gaps import near_gaps, relative_gaps
 from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
@@ -17,6 +18,8 @@ from tisim.engine.batches import Progress
 CONTACT_GAP = 1e-3
 """Gap (D) up to which bodies count as touching where protocols are compared. Some leave overlaps of up to
 1e-4 D between touching bodies, others gaps as wide as their last trial moves."""
+SHELL_GAP = 0.4
+"""Gap (D) up to which bodies are neighbours in the bond order, the first minimum of the pair correlation."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +77,11 @@ def fraction_of(result: Result) -> float:
     return packing_fraction(PackedBodies.from_result(result), volume_of(result))
 
 
-def order_of(result: Result) -> float:
-    """Return the nematic order S of the axes z."""
-    return nematic_order(PackedBodies.from_result(result).axes()[:, 2]).order
+def bond_order_of(result: Result) -> float:
+    """Return the bond order Q6 of all bonds together, of bodies with a gap of at most SHELL_GAP."""
+    bodies = PackedBodies.from_result(result)
+    bonds = contact_bonds(bodies, float(SHELL_GAP * bodies.diameters().max()))
+    return bond_order(len(bodies), bonds, 6).whole
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
@@ -84,7 +89,7 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     return (
         Quantity("packing fraction", fraction_of, random=True),
         Quantity("contact number", mean_contacts, random=True),
-        Quantity("nematic order", order_of, random=True),
+        Quantity("bond order Q6", bond_order_of, random=True),
     )
 
 

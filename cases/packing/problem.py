@@ -31,7 +31,7 @@ from tisim.shapes.particle_shape import ParticleShape
 from tisim.steppers import EnergyMinimisation
 
 VARIANTS = ("densest", "superquadrics", "permeable")
-MIXTURE_GENES = (Gene("size_ratio", "", 1.0, 2.5), Gene("large_share", "", 0.3, 0.9))
+MIXTURE_GENES = (Gene("size_ratio", "", 1.0, 2.0), Gene("large_share", "", 0.3, 0.9))
 GENES = {
     "densest": (Gene("aspect", "", 1.0, 3.0), *MIXTURE_GENES),
     "superquadrics": (

@@ -30,8 +30,6 @@ DIAMETER = 1.0
 PUBLISHED_STEP = 0.1 / (np.pi / 6)
 """The first step of the volume in B16, in volumes of a sphere."""
 
-COST, COST_ASPECT = "cost", 1.5
-"""The size of ``tisim cost``, and the aspect ratio of its rods, which have an order that spheres lack."""
 SEARCH_SETTINGS: dict[str, Any] = {
     "options": {"population": 8, "first": 12}, "ensemble": {"confirm": 8},
 }  # fmt: skip
@@ -50,10 +48,6 @@ SIZES = {
     "paper": Size(
         "500 bodies from a packing fraction of 0.05, 100,000 attempts, as B16",
         {"number": 500, "start": 0.05, "step": PUBLISHED_STEP, "attempts": 100_000},
-    ),
-    COST: Size(
-        "50 rods of Lambda = 1.5, 200 attempts: what accuracy costs",
-        {"number": 50, "start": 0.1, "step": 1.0, "attempts": 200, "method": "original"},
     ),
 }
 
@@ -147,14 +141,11 @@ def mixed(number: int, ratio: float, share: float, seed: int) -> np.ndarray:
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """Return a packing of spheres, or of short rods in the size "cost".
-
-    The start follows from the seed of the scene, so that a cost study draws its own starts.
-    """
-    body = rod(COST_ASPECT if size == COST else 1.0)
-    packed = of_shape(body, size, seed)
-    # Bounding spheres do not overlap, nor do the bodies inside them.
-    cloud = Cloud(number=len(packed.particles.masses(seed)), radius=body.bounding_radius(), density=1.0)
+    """Return a packing of spheres, the start of which follows from the seed of the scene, so that
+    ``tisim cost`` can draw many."""
+    packed = of_shape(rod(1.0), size, seed)
+    number = len(packed.particles.masses(seed))
+    cloud = Cloud(number=number, radius=DIAMETER / 2, density=1.0)
     return packed.model_copy(update={"particles": cloud})
 
 
