@@ -151,7 +151,7 @@ def problem(size: str = "default", variant: str = "densest") -> Problem:
     """Return the search for packings of a variant."""
     must(variant in GENES, "variant", f"one of {', '.join(GENES)}", variant)
     searched_size(size, SIZES)
-    limits = SEARCHED[size]
+    limits, names = SEARCHED[size], [gene.name for gene in GENES[variant]]
 
     def scene(design: Mapping[str, float], seed: int) -> Scene:
         sizes = design.get("size_ratio", 1.0), design.get("large_share", 1.0)
@@ -164,7 +164,7 @@ def problem(size: str = "default", variant: str = "densest") -> Problem:
         genome=Genome(GENES[variant]),
         scene=scene,
         objective=OBJECTIVES[variant],
-        meanings=MEANINGS,
+        meanings={name: MEANINGS[name] for name in (*names, *(one.name for one in OBJECTIVES[variant]))},
         picture=lambda scene, result: picture(result),
         details=details,
     )

@@ -19,7 +19,7 @@ from tisim.accuracy.scene_changes import (
     within,
 )
 from tisim.components import serialization
-from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.accuracy_parameter import AccuracyParameter, three_digits
 from tisim.components.component import Component
 from tisim.effects.base import Effect
 from tisim.errors import InputError
@@ -243,16 +243,21 @@ def _softer(scene: Scene, properties: Mapping[str, float], starts: int) -> Setti
     return SettingSweep(f"softer, in longer steps: {', '.join(properties)}", tuple(settings), weights, scene)
 
 
+def with_control(name: str, stepper: Stepper) -> str:
+    """Return a name of a stepper followed by the kind of its step control, if that trades accuracy for
+    time."""
+    control = stepper.control
+    return f"{name}, {type(control).__name__}" if control.accuracy_parameters else name
+
+
 def _title(scene: Scene, path: str) -> str:
     if not path.startswith("stepper"):
         return path.removeprefix("effects.")
     # Required settings of every such stepper, such as the fluid, do not distinguish methods.
     stepper, fields = scene.stepper, type(scene.stepper).model_fields
     chosen = [
-        f"{k}={v!r}"
+        f"{k}={three_digits(v) if isinstance(v, float) else v!r}"
         for k, v in non_default_settings(stepper).items()
         if k != "control" and not fields[k].is_required()
     ]
-    name = type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else "")
-    # A control without accuracy parameters makes no difference.
-    return f"{name}, {type(stepper.control).__name__}" if stepper.control.accuracy_parameters else name
+    return with_control(type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else ""), stepper)

@@ -24,7 +24,7 @@ class AccuracyParameter:
     A part lists its own in ``accuracy_parameters``, and ``tisim cost`` varies them.
 
     converges : whether the error of the part vanishes with the parameter; False if another setting, which is
-        not varied, also limits the error.
+        not varied, also limits the error. Its order then only spaces the values that are tried.
     """
 
     def __init__(self, *, converges: bool = True, **orders: float) -> None:
