@@ -1,7 +1,7 @@
 """The fitness functions of packing do not change unintentionally.
 
-Packings are chaotic: the rounding of another compiler leads to other packings, of the same mean density. Their
-means over starts are stored.
+Packings are chaotic: the rounding of another compiler leads to other packings, of the same mean density.
+Means over starts are stored.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ DENSE = {
     (3.0, 1.0, 0.5): (0.0, 0.0),
     (1.0, 2.0, 0.7): (0.0, 0.0),
 }
-"""Aspect ratio, size ratio and share of the larger bodies -> mean packing fraction, and its standard error."""
+"""Aspect ratio, size ratio, share of the larger bodies -> mean packing fraction, and its standard error."""
 
 
 def means(change=0.0):
