@@ -147,7 +147,8 @@ def _ratios(axis: Axes, found: Sequence[Rotated]) -> None:
                       fmt="o-", ms=4, capsize=3, color=colour, label=f"{m:g} A/m")  # fmt: skip
         for x, one in zip(place, found, strict=True):
             each = one.elongations(m)
-            axis.plot(np.full(len(each), x), each, ".", ms=3, color=colour, alpha=0.5)
+            # Beside the interval, which would hide them.
+            axis.plot(np.full(len(each), 1.012 * x), each, "_", ms=6, mew=1.2, color=colour)
         theirs = [published_ratio(one.printed, m) for one in found]
         axis.plot(place, theirs, "D", ms=6, mfc="none", color=colour, label=f"L21, {m:g} A/m, 50 cm")
     axis.set(xlabel="rotation of the cloud (µrad/s)", ylabel="longest axis over shortest", xscale="log")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 
-from tisim import Scene, Simulation
+from tisim import Scene
 from tisim.accuracy import Quantity
 from tisim.analysis import cluster_shapes, fraction_in_clusters, head_to_tail
 from tisim.cases.case import Size
@@ -18,7 +17,7 @@ from tisim.cases.coalescence import published
 from tisim.cases.coalescence.scene import scale_of, scene
 from tisim.cases.common.rubble_pile import Asteroid, Conserved, body, clusters_of, part
 from tisim.cases.common.runs import overlap, sound
-from tisim.engine.batches import Progress
+from tisim.engine.batches import Progress, loaded
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 
@@ -126,8 +125,7 @@ def sampled(
     sample : computes a sample from a state. RunError if a run fails.
     """
     seen: list[list[T]] = [[] for _ in scenes]
-    with closing(Simulation(scenes[0], len(scenes))) as simulation:
-        simulation.load(scenes)
+    with loaded(scenes) as simulation:
         for time in times:
             simulation.run(until=time)
             for one, result in zip(seen, sound(simulation.results()), strict=True):

@@ -22,6 +22,7 @@ from tisim.analysis import contacts, disjoint_chains, periodic_sides
 from tisim.cases.common.runs import sound
 from tisim.cases.mrf_shear.measures import CHAINED
 from tisim.cases.mrf_shear.scene import LOWER, STRAIN, UPPER, scene
+from tisim.engine.batches import loaded
 from tisim.operators import JoinGroup
 from tisim.scene.initial_state import Arrays
 
@@ -234,12 +235,10 @@ def followed(settings: Mapping[str, Any], starts: int) -> tuple[list[Followed], 
 
 def follow(scenes: Sequence[Scene]) -> list[Followed]:
     """Return cells of one structure that are run as one batch and followed; RunError if one fails."""
-    simulation = Simulation(scenes[0], len(scenes), max(one.capacity() for one in scenes))
-    simulation.load(list(scenes))
     series = PositionSeries(scenes)
-    simulation.run(observers=[series])
-    results = sound(simulation.results())
-    simulation.close()
+    with loaded(scenes) as simulation:
+        simulation.run(observers=[series])
+        results = sound(simulation.results())
     return [
         Followed(result, np.array([position for _, position in rows]))
         for result, rows in zip(results, series.rows, strict=True)

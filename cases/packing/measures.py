@@ -1,9 +1,11 @@
 """Measures of packings, and many packings as one batch."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from tisim import Result, Scene, run
+import numpy as np
+
+from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.analysis.packings.bond_order import bond_order, contact_bonds
 from tisim.analysis.packings.contact_numbers import contact_numbers
@@ -13,11 +15,14 @@ from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.common.runs import sound
 from tisim.effects import Confinement
-from tisim.engine.batches import Progress
+from tisim.engine.batches import Batches, Progress
+
+CUTOFF = 1e-4
+"""Gap (D) up to which bodies are in contact in B16 chapters 3 and 4."""
 
 CONTACT_GAP = 1e-3
-"""Gap (D) up to which bodies count as touching where protocols are compared. Some leave overlaps of up to
-1e-4 D between touching bodies, others gaps as wide as their last trial moves."""
+"""Gap (D) up to which bodies count as touching in pictures, and where protocols are compared. Some leave
+overlaps of up to 1e-4 D between touching bodies, others gaps as wide as their last trial moves."""
 SHELL_GAP = 0.4
 """Gap (D) up to which bodies are neighbours in the bond order, the first minimum of the pair correlation."""
 
@@ -26,13 +31,15 @@ SHELL_GAP = 0.4
 class MeasuredPacking:
     """A packing and its measures.
 
-    fraction : packing fraction. contacts : mean contact number. held : mean contact number of bodies that are
-    not rattlers. nematic : S of the axes z. cubatic : S4. attempts : of the run.
+    fraction : packing fraction. contacts : mean contact number, extrapolated to contact (B16 2.2.5).
+    touching : mean number of bodies within CUTOFF (B16 3.3). held : ``contacts`` of bodies that are not
+    rattlers. nematic : S of the axes z. cubatic : S4. attempts : of the run.
     """
 
     bodies: PackedBodies
     fraction: float
     contacts: float
+    touching: float
     held: float
     nematic: float
     cubatic: float
@@ -48,6 +55,7 @@ def measured(result: Result) -> MeasuredPacking:
         bodies=bodies,
         fraction=packing_fraction(bodies, volume_of(result)),
         contacts=numbers.at_contact.value,
+        touching=2 * len(near_gaps(bodies, CUTOFF * float(bodies.diameters().max())).pairs) / len(bodies),
         held=numbers.held_at_contact.value,
         nematic=nematic_order(axes[:, 2]).order,
         cubatic=cubatic_order(bodies).order,
@@ -65,11 +73,16 @@ def volume_of(result: Result) -> float | None:
     return around[0].container.volume_in(side, float(bodies.diameters()[0]))
 
 
+def contact_counts(packing: PackedBodies) -> np.ndarray:
+    """Return the number of bodies that each body touches, with a gap of at most CONTACT_GAP, shape (n,)."""
+    gaps = near_gaps(packing, float(CONTACT_GAP * packing.diameters().max()))
+    pairs = gaps.pairs[relative_gaps(packing, gaps) <= CONTACT_GAP]
+    return np.bincount(pairs.ravel(), minlength=len(packing))
+
+
 def mean_contacts(result: Result) -> float:
-    """Return the mean contact number: contacts have gaps of at most CONTACT_GAP, whatever the protocol."""
-    bodies = PackedBodies.from_result(result)
-    gaps = near_gaps(bodies, float(CONTACT_GAP * bodies.diameters().max()))
-    return 2 * int((relative_gaps(bodies, gaps) <= CONTACT_GAP).sum()) / len(bodies)
+    """Return the mean number of bodies that a body touches."""
+    return float(contact_counts(PackedBodies.from_result(result)).mean())
 
 
 def fraction_of(result: Result) -> float:
@@ -93,6 +106,13 @@ def quantities(scene: Scene) -> tuple[Quantity, ...]:
     )
 
 
-def packings(scenes: Sequence[Scene], progress: Progress | None = None) -> list[MeasuredPacking]:
-    """Return the packings of scenes, packed as one batch; RunError if a run fails."""
-    return [measured(result) for result in sound(run(list(scenes), progress))]
+def packings(
+    scenes: Sequence[Scene], progress: Progress | None = None, together: int = 256
+) -> Iterator[tuple[int, MeasuredPacking]]:
+    """Yield (index into scenes, packing) as the packings end; RunError if a run fails.
+
+    together : largest number of packings that are made side by side.
+    """
+    for index, result in Batches(together).run(scenes, progress):
+        (result,) = sound([result])
+        yield index, measured(result)

@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from tisim import Result, Scene
 from tisim.analysis import PackedBodies, nematic_order, packing_fraction, permeability, specific_surface
 from tisim.cases.case import searched_size
-from tisim.cases.packing.figures import draw_by_contacts
 from tisim.cases.packing.measures import fraction_of, mean_contacts
 from tisim.cases.packing.scene import DIAMETER, SIZES, TITLE, packed_by
+from tisim.cases.packing.snapshots import draw_by_contacts
 from tisim.errors import must
 from tisim.optimize import Gene, Genome, Objective, Problem
 from tisim.plotting.style import empty
@@ -61,8 +61,8 @@ MEANINGS = {
 }
 FEWEST_LARGE = 20
 """Least number of larger bodies of a mixture. Fewer of them jam at densities that differ by a tenth."""
-DENSE, LONG = 0.8, 4.0
-"""Packing fractions that are not expected to be exceeded: DENSE, and LONG over the aspect ratio of a body."""
+DENSE, SLENDER = 0.8, 4.0
+"""Packing fractions that are not expected to be exceeded: DENSE, and SLENDER over the aspect ratio of a body."""
 SEARCH_START = 0.2
 """Packing fraction of the start of a design."""
 QUICK = EnergyMinimisation(precision=1e-3, tolerance=1e-3, patience=100, fraction_step=0.03)
@@ -93,7 +93,7 @@ class Design:
         is long, with FEWEST_LARGE of them. InputError for more than ``most``."""
         length, volume = 2 * self.shape.bounding_radius(), self.shape.volume()
         aspect = length / (2 * float(self.shape.half_extents().min()))
-        large = self.share * min(DENSE, LONG / aspect) * (2 * length) ** 3 / volume
+        large = self.share * min(DENSE, SLENDER / aspect) * (2 * length) ** 3 / volume
         large = max(large, FEWEST_LARGE if self.share < 1 else 0)
         needed = ceil(large * (1 + (1 - self.share) / self.share * self.ratio**3))
         rule = f"at most {self.most}, for a box twice as wide as the largest is long"

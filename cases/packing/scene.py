@@ -41,8 +41,8 @@ SIZES = {
         {"generations": 8, "max_evaluations": 80, **SEARCH_SETTINGS},
     ),
     "default": Size(
-        "200 bodies from a packing fraction of 0.1, 3000 attempts",
-        {"number": 200, "start": 0.1, "step": 1.0, "attempts": 3000},
+        "200 bodies from a packing fraction of 0.1, 2000 attempts",
+        {"number": 200, "start": 0.1, "step": 1.0, "attempts": 2000},
         {"generations": 20, "max_evaluations": 200, **SEARCH_SETTINGS},
     ),
     "paper": Size(

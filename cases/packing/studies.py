@@ -2,9 +2,9 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
-from typing import Any, Literal
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, fields, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -13,61 +13,55 @@ from tisim.analysis.packings.wall_alignment import wall_alignment
 from tisim.cases.case import size_named
 from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.packing.measures import MeasuredPacking, packings
-from tisim.cases.packing.scene import SIZES, of_shape, rod, superball
+from tisim.cases.packing.scene import PUBLISHED_STEP, SIZES, of_shape, rod, superball
 from tisim.engine.batches import Progress
 from tisim.geometry import CylindricalContainer, WedgeContainer
-from tisim.geometry.container import Container
+from tisim.geometry import container as containers
 from tisim.shapes.particle_shape import ParticleShape
 
-Study = Literal["aspect ratio", "cylinder", "wedge", "superballs", "moment of inertia"]
-ASPECTS = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0)
+Study = Literal["aspect ratio", "long rods", "cylinder", "wedge", "superballs", "moment of inertia", "effort"]
+STUDIES: tuple[Study, ...] = get_args(Study)
+ASPECTS = (1.0, 1.1, 1.25, 1.4, 1.5, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
 """Aspect ratios Lambda of rods in a periodic box."""
-CONFINED_ASPECTS = (1.0, 2.0, 3.0, 5.0)
-"""Aspect ratios in a cylinder and a wedge."""
-WIDTHS = (1.1, 1.4, 1.7, 2.05, 2.3, 2.6, 3.0, 3.5, 4.5, 6.0, 8.0)
+REVISED_ASPECTS = (1.0, 1.5, 3.0, 5.0, 10.0)
+"""Aspect ratios that are also packed by the revised method."""
+LONG_ASPECTS = (25.0, 50.0)
+"""Aspect ratios of long rods, for which B16 finds phi L/D = 5."""
+CYLINDER_ASPECTS = (1.0, 3.0)
+"""Aspect ratios in a cylinder."""
+WIDTHS = (1.1, 1.4, 1.67, 1.9, 2.05, 2.3, 2.6, 3.1, 4.5, 8.0)
 """Diameters D_cyl of cylinders, D."""
-ANGLES = (18.0, 27.0, 45.0)
+IN_FILE = 50
+"""Bodies in a cylinder in which they cannot pass each other or turn round."""
+WEDGE_ASPECTS = (1.25, 3.0)
+"""Aspect ratios in a wedge."""
+ANGLES = (9.0, 45.0)
 """Angles of wedges, degrees."""
-WEDGE_LENGTHS = (1.2, 1.6, 2.0, 3.0)
+WEDGE_LENGTHS = (1.2, 3.0)
 """Lengths l_w of wedges over the shortest one that holds a row of rods (B16 (2.12))."""
 CONFINED_START = 0.03
 """Packing fraction of a start in a cylinder or a wedge, much of which bodies cannot reach."""
-EXPONENTS = (2.0, 2.1, 2.2, 2.4, 2.6, 2.8, 3.0, 3.5, 4.0, 5.0)
+EXPONENTS = (2.0, 2.5, 3.0, 4.0, 5.0)
 """Exponents gamma of superballs."""
-INERTIAS = (1e-2, 1e-1, 0.3, 1.0, 3.0, 10.0, 1e2)
+INERTIAS = (1e-2, 1e-1, 0.3, 1.0, 10.0, 1e2)
 """xi over the moment of inertia."""
-INERTIA_ASPECTS = (1.0, 1.5, 3.0)
+INERTIA_ASPECTS = (1.5, 3.0)
 """Aspect ratios for which xi is varied."""
 STEADY_MOTION = 0.5
 """``motion`` of the revised method in these studies. With B16's 0.1 packings need several times the attempts,
 and 200 spheres end at 0.602 in place of 0.610 with 3000."""
-
-
-@dataclass(frozen=True)
-class PackedRow:
-    """A packing of a study: a line of its table. Lengths are in D; an angle is in degrees; NaN where it does
-    not apply."""
-
-    study: str
-    method: str
-    shape: float
-    width: float
-    angle: float
-    inertia: float
-    seed: int
-    number: int
-    attempts: int
-    fraction: float
-    contacts: float
-    held: float
-    nematic: float
-    cubatic: float
-    aligned: float
+TOGETHER = 8
+"""Packings that are made side by side; a study that is stopped loses at most these."""
 
 
 @dataclass(frozen=True)
 class PackedPlan:
-    """The packings of a study: scenes that differ in shape, width, angle and xi, from several seeds."""
+    """Packings that differ only in their seeds.
+
+    shape : aspect ratio of rods, or exponent of superballs. width : D_cyl or l_w (D). angle : of a wedge
+    (degrees). inertia : xi over the moment of inertia. number, start, step, limit, halvings, tolerance : of
+    ``scene``, whose ``attempts`` is ``limit``; None for the value of the size.
+    """
 
     study: Study
     shape: float
@@ -75,12 +69,18 @@ class PackedPlan:
     width: float = np.nan
     angle: float = np.nan
     inertia: float = 1.0
+    number: int | None = None
+    start: float | None = None
+    step: float | None = None
+    limit: int | None = None
+    halvings: int | None = None
+    tolerance: float | None = None
 
     def body(self) -> ParticleShape:
         """Return the shape of the bodies."""
         return superball(self.shape) if self.study == "superballs" else rod(self.shape)
 
-    def container(self) -> Container | None:
+    def container(self) -> containers.Container | None:
         """Return the container; None for a periodic box."""
         if self.study == "cylinder":
             return CylindricalContainer(diameter=self.width)
@@ -88,65 +88,175 @@ class PackedPlan:
             return WedgeContainer(length=self.width, angle=np.radians(self.angle))
         return None
 
-    def number(self, usual: int) -> int:
+    def options(self, size: str, **settings: Any) -> dict[str, Any]:
+        """Return the arguments of ``of_shape``. settings : of ``scene``, which replace those of the size."""
+        usual = {"halvings": 4, "tolerance": 1e-4, **size_named(size, SIZES).scene, **settings}
+        around, start = self.container(), self.start
+        if around is not None and start is None:
+            start = CONFINED_START
+        own = {"start": start, "step": self.step, "attempts": self.limit, "halvings": self.halvings}
+        own |= {"tolerance": self.tolerance, "number": self.least_number(self.number or usual["number"])}
+        options = usual | {key: value for key, value in own.items() if value is not None}
+        if self.step is None:
+            # The same relative step of the volume, however many bodies the box needs.
+            options["step"] *= options["number"] / usual["number"]
+        options |= {"motion": STEADY_MOTION} if self.method == "revised" else {"inertia": self.inertia}
+        return {**options, "method": self.method, "container": around}
+
+    def least_number(self, usual: int) -> int:
         """Return the number of bodies: ``usual``, or more, to keep the box twice as wide as a body is
         long."""
         body, around = self.body(), self.container()
         length = 2 * body.bounding_radius()
         # Densities that these packings do not exceed, with a margin.
-        dense = 0.75 if self.shape < 5 else min(0.75, 6.5 / self.shape)
-        section = (2.1 * length) ** 2 if around is None else self.section()
+        dense = 0.75 if self.shape < 5 else min(0.75, 6.0 / self.shape)
+        section = (2.1 * length) ** 2 if around is None else around.volume_in(np.ones(3), 1.0)
         return max(usual, int(np.ceil(dense * section * 2.1 * length / body.volume())))
 
-    def section(self) -> float:
-        """Return the area (D^2) of the cross-section of the container."""
-        around = self.container()
-        assert around is not None
-        return around.volume_in(np.ones(3), 1.0)
+
+@dataclass(frozen=True)
+class PackedRow:
+    """A packing of a study: a line of its table, which begins with what is known before it is packed.
+
+    Lengths are in D; an angle is in degrees; NaN where it does not apply. step : first step of the volume, in
+    volumes of a body. limit : attempts for a contraction. attempts : of the whole run.
+    """
+
+    study: str
+    method: str
+    shape: float
+    width: float
+    angle: float
+    inertia: float
+    number: int
+    step: float
+    limit: int
+    halvings: int
+    tolerance: float
+    seed: int
+    attempts: int
+    fraction: float
+    contacts: float
+    touching: float
+    held: float
+    nematic: float
+    cubatic: float
+    aligned: float
+
+    def key(self) -> tuple[str, ...]:
+        """Return the columns that identify the packing."""
+        return key_of({name: getattr(self, name) for name in IDENTITY})
+
+    def place(self) -> tuple[Any, ...]:
+        """Return the place of the packing among those of its study, by which they are sorted."""
+        # NaN has no place.
+        numbers = np.nan_to_num([self.shape, self.angle, self.width, self.inertia, self.limit, self.seed])
+        return (self.method, *numbers.tolist())
+
+
+IDENTITY = tuple(one.name for one in fields(PackedRow)[:12])
+"""Columns that are known before a packing is made."""
+MEASURES = ("fraction", "contacts", "touching", "held", "nematic", "cubatic")
+"""Columns that are measures of the packing by itself."""
 
 
 def plans(study: Study) -> list[PackedPlan]:
     """Return the packings of a study."""
     if study == "aspect ratio":
-        return [PackedPlan(study, one, method) for method in ("original", "revised") for one in ASPECTS]
+        both = (("original", ASPECTS), ("revised", REVISED_ASPECTS))
+        return [PackedPlan(study, one, method) for method, aspects in both for one in aspects]
+    if study == "long rods":
+        # Starts and steps in proportion to the density at the end, which is about 5/Lambda.
+        return [
+            PackedPlan(study, one, start=1.5 / one, step=0.4 * one * number / 200, limit=200, number=number)
+            for one in LONG_ASPECTS
+            for number in [PackedPlan(study, one).least_number(1)]
+        ]
     if study == "cylinder":
-        return [PackedPlan(study, one, width=width) for one in CONFINED_ASPECTS for width in WIDTHS]
+        # In a file, overlaps vanish by diffusion from body to body, so short files need far fewer attempts.
+        return [
+            PackedPlan(study, one, width=width, number=IN_FILE if width <= max(2.2, one) else None)
+            for one in CYLINDER_ASPECTS
+            for width in WIDTHS
+        ]
     if study == "wedge":
         return [
-            PackedPlan(
-                study, one, width=factor * WedgeContainer.shortest(np.radians(angle), one), angle=angle
-            )
-            for one in CONFINED_ASPECTS
+            PackedPlan(study, one, width=factor * shortest(one, angle), angle=angle)
+            for one in WEDGE_ASPECTS
             for angle in ANGLES
             for factor in WEDGE_LENGTHS
         ]
     if study == "moment of inertia":
-        return [PackedPlan(study, one, inertia=xi) for one in INERTIA_ASPECTS for xi in INERTIAS]
-    return [PackedPlan(study, one, "revised") for one in EXPONENTS]
+        return [
+            PackedPlan(study, one, inertia=xi, limit=1000, halvings=2)
+            for one in INERTIA_ASPECTS
+            for xi in INERTIAS
+        ]
+    if study == "effort":
+        spheres, rods = PackedPlan(study, 1.0), PackedPlan(study, 1.5)
+        limits = [replace(one, limit=limit) for one in (spheres, rods) for limit in (200, 2000, 20_000)]
+        tolerances = [replace(spheres, tolerance=one) for one in (1e-3, 1e-5)]
+        published = replace(spheres, number=500, start=0.05, step=PUBLISHED_STEP)
+        steps = [replace(spheres, step=PUBLISHED_STEP), published, replace(published, limit=100_000)]
+        return [*limits, *tolerances, *steps]
+    # The search for contacts of superquadrics takes long.
+    return [PackedPlan(study, one, "revised", number=100, limit=500) for one in EXPONENTS]
+
+
+def shortest(aspect: float, angle: float) -> float:
+    """Return the length (D) of the shortest wedge that holds a row of rods. angle : degrees."""
+    return WedgeContainer.shortest(np.radians(angle), aspect)
+
+
+def measured_packings(
+    chosen: Sequence[PackedPlan],
+    size: str,
+    starts: int,
+    progress: Progress | None = None,
+    made: Container[tuple[str, ...]] = (),
+    **settings: Any,
+) -> Iterator[tuple[PackedRow, MeasuredPacking]]:
+    """Pack the plans from random starts; yield the line and the packing of each as it ends.
+
+    made : keys of packings that are left out. settings : of ``scene``, which replace those of the size.
+    """
+    each = [
+        (plan, given(plan, plan.options(size, **settings), seed)) for plan in chosen for seed in range(starts)
+    ]
+    each = [(plan, known) for plan, known in each if key_of(known) not in made]
+    scenes = [
+        of_shape(plan.body(), size, known["seed"], **plan.options(size, **settings)) for plan, known in each
+    ]
+    for index, one in packings(scenes, progress, TOGETHER):
+        yield row(*each[index], one), one
 
 
 def packed(
     chosen: Sequence[PackedPlan], size: str, starts: int, progress: Progress | None = None, **settings: Any
 ) -> list[PackedRow]:
-    """Return the packings of plans from random starts, packed as one batch."""
-    usual = {**size_named(size, SIZES).scene, **settings}
-    each = [(plan, seed) for plan in chosen for seed in range(starts)]
-    scenes = []
-    for plan, seed in each:
-        options: dict[str, Any] = {"method": plan.method}
-        options |= {"motion": STEADY_MOTION} if plan.method == "revised" else {"inertia": plan.inertia}
-        options |= {"number": plan.number(usual["number"]), "container": plan.container()}
-        if plan.container() is not None:
-            options["start"] = CONFINED_START
-        scenes.append(of_shape(plan.body(), size, seed, **{**settings, **options}))
-    return [row(plan, seed, one) for (plan, seed), one in zip(each, packings(scenes, progress), strict=True)]
+    """Return the lines of the packings of plans from random starts, in this order."""
+    rows = {one.key(): one for one, _ in measured_packings(chosen, size, starts, progress, **settings)}
+    options = [(plan, plan.options(size, **settings)) for plan in chosen]
+    return [rows[key_of(given(*one, seed))] for one in options for seed in range(starts)]
 
 
-def row(plan: PackedPlan, seed: int, one: MeasuredPacking) -> PackedRow:
+def given(plan: PackedPlan, options: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """Return the columns of a line that are known before it is packed."""
+    by = {name: getattr(plan, name) for name in ("study", "method", "shape", "width", "angle", "inertia")}
+    effort = {name: options[name] for name in ("halvings", "step", "tolerance", "number")}
+    return {**by, **effort, "limit": options["attempts"], "seed": seed}
+
+
+def key_of(known: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the columns that identify a packing as text."""
+    values = [known[name] for name in IDENTITY]
+    return tuple(f"{one:.12g}" if isinstance(one, float | int) else one for one in values)
+
+
+def row(plan: PackedPlan, known: Mapping[str, Any], one: MeasuredPacking) -> PackedRow:
     """Return the line of a packing."""
-    given = plan.study, plan.method, plan.shape, plan.width, plan.angle, plan.inertia, seed
-    measures = one.fraction, one.contacts, one.held, one.nematic, one.cubatic
-    return PackedRow(*given, len(one.bodies), one.attempts, *measures, aligned(plan, one))
+    measures = {name: getattr(one, name) for name in MEASURES}
+    return PackedRow(**known, **measures, attempts=one.attempts, aligned=aligned(plan, one))
 
 
 def aligned(plan: PackedPlan, one: MeasuredPacking) -> float:
@@ -157,6 +267,12 @@ def aligned(plan: PackedPlan, one: MeasuredPacking) -> float:
     side, unit = one.bodies.high - one.bodies.low, float(one.bodies.diameters()[0])
     distance, normal = around.distances(one.bodies.position - one.bodies.low, side, unit)
     return wall_alignment(one.bodies, distance, normal).fraction
+
+
+def plan_of(one: PackedRow) -> PackedPlan:
+    """Return the plan of a line without its effort."""
+    by = {name: getattr(one, name) for name in ("shape", "method", "width", "angle", "inertia")}
+    return PackedPlan(one.study, **by)  # type: ignore[arg-type]
 
 
 def table(rows: Iterable[PackedRow]) -> str:

@@ -1,20 +1,19 @@
 """The stages of a spin-up: a pile settles, and its spin is then increased in steps, each held for a while."""
 
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from tisim import Result, Scene, Simulation
+from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.cases.coalescence import published
 from tisim.cases.common.rubble_pile import Asteroid, Conserved, body, clusters_of, part
 from tisim.cases.common.runs import overlap, sound
 from tisim.cases.spin_up.scene import scene
-from tisim.engine.batches import Progress
+from tisim.engine.batches import Progress, loaded
 from tisim.engine.particle_state import ParticleState
 from tisim.scene.initial_state import Arrays
 
@@ -173,8 +172,7 @@ def spun_up(
     ends = stage_ends(settled, rates, holds)
     scenes = [one.model_copy(update={"duration": float(ends[-1])}) for one in clouds]
     seen: list[list[SpinStep]] = [[] for _ in scenes]
-    with closing(Simulation(scenes[0], len(scenes))) as simulation:
-        simulation.load(scenes)
+    with loaded(scenes) as simulation:
         for rate, end in zip((0.0, *rates), (settled, *ends), strict=True):
             if rate:
                 for state in simulation.states:

@@ -13,7 +13,7 @@ from tisim.cases.common.runs import sound
 from tisim.cases.valve import published
 from tisim.cases.valve.measures import duct_of, rate
 from tisim.cases.valve.scene import FIELD, FINE_DIAMETER, THROATS, D, scene
-from tisim.engine.batches import Progress
+from tisim.engine.batches import Progress, loaded
 from tisim.sources import MagneticField
 
 Settings = Mapping[str, Any]
@@ -95,13 +95,10 @@ class Flow:
 
 def flows(scenes: Sequence[Scene], progress: Progress = lambda part: None) -> list[Flow]:
     """Return the flows of scenes, run as one batch; RunError if one fails."""
-    simulation = Simulation(scenes[0], len(scenes), max(one.capacity() for one in scenes))
-    simulation.load(list(scenes))
     series = FlowSeries(scenes)
-    simulation.run(observers=[series, lambda simulation: progress(simulation.fraction())])
-    results = simulation.results()
-    simulation.close()
-    sound(results)
+    with loaded(scenes) as simulation:
+        simulation.run(observers=[series, lambda simulation: progress(simulation.fraction())])
+        results = sound(simulation.results())
     return [Flow(result, *np.array(rows).T) for result, rows in zip(results, series.rows, strict=True)]
 
 

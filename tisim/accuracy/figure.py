@@ -20,6 +20,8 @@ MARKERS = "osD^vP<>X"
 """Markers of the methods, used in turn."""
 STYLES = {USUAL_NUMBERS: "-", ("f64", "fast"): ":"}
 """Line styles of precisions and arithmetics; others are dashed."""
+LARGEST_ERROR = 100.0
+"""Relative error beyond which an axis is not extended."""
 LEGEND_WIDTH = 80
 """Largest number of characters in a line of the legend; a panel is this wide."""
 
@@ -90,7 +92,7 @@ def _panel(axis: Axes, study: Study, lines: list[str], k: int) -> None:
             textcoords="offset points", ha="right", va="top", fontsize=8,
         )  # fmt: skip
     # Leave room for a ring at the top; do not extend the axis for outliers.
-    axis.set_ylim(low, min(1.2 * high, max(30.0, 30.0 * low)))
+    axis.set_ylim(low, min(1.2 * high, max(LARGEST_ERROR, 30.0 * low)))
     quantity = study.quantities[k]
     axis.set_title(f"{quantity.name}, relative to {quantity.relative_to}")
     left, right = axis.get_xlim()
@@ -116,17 +118,10 @@ def _usual_method(row: Row) -> str:
 
 
 def _label(study: Study, method: str) -> str:
-    """Return the name of a method, with the number of failed settings and the cause.
-
-    The time of the failure and advice are in the table.
-    """
+    """Return the name of a method, with the number of failed settings; the causes are in the table."""
     rows = study.line(method)
-    failed = [row.failed for row in rows if row.failed]
-    if not failed:
-        return method
-    many = "" if len(failed) == len(rows) else f"{len(failed)} of {len(rows)} "
-    cause = re.sub(r"^found at t = \S+ s: ", "", failed[0]).partition(" (")[0].partition(";")[0]
-    return f"{method}; {many}failed: {cause}"
+    failed = sum(bool(row.failed) for row in rows)
+    return f"{method} ({failed} of {len(rows)} failed)" if failed else method
 
 
 def _ring(axis: Axes, rows: list[Row], k: int, style: str, label: str) -> None:

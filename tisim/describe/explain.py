@@ -25,7 +25,7 @@ COST_OF_ABSENT = "1.006 (0.981 to 1.034)"
 of 3 pairs of runs, the least and the largest (tests/benchmarks/absent_effects.py --scene vibration)."""
 BRIEF_WIDTH = 130
 """Largest number of characters of the values of a part in the brief form."""
-FAMILY_NAMES = {"base": "bodies", "constraint": "bodies", "walls": "bodies", "gravitation": "pair"}
+FAMILY_NAMES = {"constraint": "bodies", "walls": "bodies", "gravitation": "pair"}
 """Families of effects that do not have the name of the room in which they are."""
 
 

@@ -1,7 +1,4 @@
 from .base import (
-    Confinement as Confinement,
-)
-from .base import (
     Constraint as Constraint,
 )
 from .base import (
@@ -222,6 +219,7 @@ from .pair.morse import Morse as Morse
 from .pair.near_field import NearField as NearField
 from .pair.near_field import TruncatedNearField as TruncatedNearField
 from .pair.virial import Virial as Virial
+from .walls.confinement import Confinement as Confinement
 from .walls.motion import Fixed as Fixed
 from .walls.motion import Motion as Motion
 from .walls.oscillation import Oscillation as Oscillation

@@ -94,7 +94,7 @@ class Batches:
             yield index, Result(scenes[index], {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
         finished_scenes = len(failures)
         for structure, members in groups.items():
-            with self._simulation(structure, [scenes[k] for k in members]) as simulation:
+            with self.simulation(structure, [scenes[k] for k in members]) as simulation:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
                     simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
@@ -109,7 +109,7 @@ class Batches:
                     finished_scenes += len(batch)
 
     @contextmanager
-    def _simulation(self, structure: Any, scenes: Sequence[Scene]) -> Iterator[Simulation]:
+    def simulation(self, structure: Any, scenes: Sequence[Scene]) -> Iterator[Simulation]:
         """Yield a compiled simulation for scenes of this structure, reserved for this caller meanwhile."""
         capacity = max(scene.capacity() for scene in scenes)
         worlds = max(1, min(len(scenes), self.limit, BATCH_PARTICLES // capacity))
@@ -197,6 +197,19 @@ memory.reclaimers.append(_close_idle)
 
 
 _batches = Batches()
+
+
+@contextmanager
+def loaded(scenes: Sequence[Scene]) -> Iterator[Simulation]:
+    """Yield a simulation into which scenes of one structure are loaded, for callers that change or read
+    states between parts of a run.
+
+    The simulation is kept for later calls, as those of ``run`` are. Kernels are never freed, so a search that
+    made a new one for each design would need more and more memory.
+    """
+    with runtime.turn, _batches.simulation(scenes[0].structure(), scenes) as simulation:
+        simulation.load(scenes)
+        yield simulation
 
 
 @overload

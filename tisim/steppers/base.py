@@ -10,7 +10,6 @@ import numpy as np
 
 from tisim.components.component import Component, option
 from tisim.effects.base import (
-    Confinement,
     Constraint,
     DerivedQuantity,
     Effect,
@@ -69,7 +68,7 @@ class Stepper(Component):
             if isinstance(effect, Constraint):
                 rule = f"one that follows constraints, such as verlet, with effects.{effect.label}"
                 must(self.follows_constraints, "stepper", rule, self.kind())
-            elif isinstance(effect, HardBodies | Confinement):
+            elif isinstance(effect, HardBodies):
                 rule = f"one that packs, such as mechanical_contraction, with effects.{effect.label}"
                 must(self.packs, "stepper", rule, self.kind())
         if domain.shears():

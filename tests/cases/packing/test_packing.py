@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from tisim import Recording, run
-from tisim.cases.packing.figures import of_cylinders, of_rods, pictures
+from tisim.cases.packing.figures import pictures
 from tisim.cases.packing.measures import measured
 from tisim.cases.packing.scene import mixed, of_shape, rod
-from tisim.cases.packing.studies import PackedPlan, means, packed, plans, read, table
 from tisim.io.reader import frames
-from tisim.plotting.bodies import facets
+from tisim.plotting.facets import facets
 from tisim.shapes import EllipsoidShape, SuperquadricShape
 
 
@@ -30,28 +29,12 @@ def test_a_mixture_is_denser_than_equal_spheres():
     assert dense > equal + 0.02
 
 
-def test_rows_of_a_study():
-    """A table is read as it was written; a container is filled to the volume between its walls."""
-    free, narrow = plans("aspect ratio")[0], PackedPlan("cylinder", 1.0, width=1.1)
-    settings = {"attempts": 40, "number": 40, "step": 3.0}
-    rows = [*packed([free], "small", 2, **settings), *packed([narrow], "small", 1, **settings)]
-    assert table(read(table(rows))) == table(rows)
-    assert [one.seed for one in rows] == [0, 1, 0]
-    # Spheres in a file, at most in contact: pi/6 D^3 in pi/4 D_cyl^2 D.
-    assert 0.1 < rows[2].fraction < 1.05 * 2 / 3 / 1.1**2
-    assert 0.3 < rows[0].fraction < 0.66
-    (mean,) = means(rows[:2], ("shape",), "fraction").values()
-    assert mean.value == pytest.approx((rows[0].fraction + rows[1].fraction) / 2)
-    assert of_rods(rows[:2]).axes[0].get_ylabel() == "packing fraction"
-    assert of_cylinders(rows[2:]).axes[0].get_xlabel() == r"$D_{cyl}/D$"
-
-
 def test_the_picture_of_a_run(tmp_path):
     scene = of_shape(rod(2.0), "small", 0, number=40, attempts=20, step=4.0)
     run(scene, record=Recording(tmp_path / "packing.h5", frames=3))
     with frames(tmp_path / "packing.h5") as trajectory:
         figure = pictures(trajectory)["packing.png"]
-    (left, right) = figure.axes
+    left, right, _scale = figure.axes
     assert left.collections
     fractions = right.lines[0].get_ydata()
     assert fractions[0] == pytest.approx(0.2)

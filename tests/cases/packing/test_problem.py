@@ -96,7 +96,7 @@ def test_surface_and_permeability_are_of_the_designed_size():
 
 
 def test_a_search_goes_on_without_a_design_that_outgrows_its_box(monkeypatch):
-    monkeypatch.setattr(searching, "LONG", 0.01)
+    monkeypatch.setattr(searching, "SLENDER", 0.01)
     searched = problem("small").fix(**EQUAL)
     ensemble = {"min_starts": 1, "select": 0, "confirm": 0}
     options = {"population": 8}

@@ -398,14 +398,14 @@ def test_what_does_not_fit_is_refused():
             {"effects": [bodies, around, around.model_copy(update={"name": "other"})]},
             "effects of kind confinement must be at most one in a scene; received 2",
         ),
-        ({"effects": [around]}, "effects must be one with hard bodies for mechanical_contraction"),
+        ({"effects": [around]}, "effects must be one with hard bodies beside confinement"),
         ({"stepper": Verlet(control=FixedStep(dt=1.0))}, "stepper must be one that packs"),
     ):
         with pytest.raises(InputError, match=message):
             Scene(**{**parts, **change})
     longer = made.start() | {"radius": np.linspace(1.0, 1.1, 80)}
     with pytest.raises(InputError, match=r"particles.radius must be in one ratio to their shapes"):
-        bodies.check_start(longer, made)
+        around.check_start(longer, made)
 
 
 @pytest.mark.slow

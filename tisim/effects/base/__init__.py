@@ -79,7 +79,6 @@ Rules of Taichi for a method with ``ti.func``:
 """
 
 from tisim.components.component import Vector, option, parameter
-from tisim.effects.base.confinement import Confinement
 from tisim.effects.base.constraint import Constraint
 from tisim.effects.base.derived_quantity import DerivedQuantity, SelfConsistentQuantity
 from tisim.effects.base.effect import Effect, SceneParts
@@ -93,7 +92,6 @@ from tisim.effects.base.shaped import Shaped
 from tisim.state.fields import Field, WorldField
 
 __all__ = [
-    "Confinement",
     "Constraint",
     "DerivedQuantity",
     "Effect",

@@ -8,11 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base.confinement import confinement
 from tisim.effects.base.effect import SceneParts
 from tisim.effects.base.pairwise import Pairwise
-from tisim.effects.base.shaped import LENGTH_TOLERANCE, Shaped
-from tisim.errors import must
+from tisim.effects.base.shaped import Shaped
 from tisim.numerics.vectors import conjugate, rotated
 
 
@@ -35,27 +33,10 @@ class HardBodies(Shaped, Pairwise):
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         self.check_shapes(start)
-        around, sizes = confinement(scene), self.sizes(start)
-        if around is not None and len(sizes):
-            container = around.container
-            same = float(np.ptp(sizes)) <= LENGTH_TOLERANCE * float(sizes.max())
-            equal = same or not any(container.scaled())
-            rule = f"in one ratio to their shapes, as the {container.kind()} grows with them"
-            must(equal, "particles.radius", rule, float(sizes.max() / sizes.min()))
 
     def unit_of(self, start: Mapping[str, np.ndarray]) -> float:
         """Return D (m) at a start."""
         return 2 * float(self.shapes()[0].half_extents().min()) * float(self.sizes(start)[0])
-
-    def check(self, scene: SceneParts) -> None:
-        around = confinement(scene)
-        if around is None:
-            return
-        container = around.container
-        rule = f"rods or spheres in a {container.kind()}, as round ends touch curved walls"
-        must(self.round_ends or not container.curved, f"effects.{self.label}", rule, self.kind())
-        known = self.offers("support") and (around.treatment == "exact" or self.offers("closest_virtual"))
-        must(known, f"effects.{around.label}.treatment", f"one for {self.kind()}", around.treatment)
 
     @ti.func
     def spun(self, s, w, i, torque):

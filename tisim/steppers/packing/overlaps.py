@@ -3,7 +3,7 @@
 from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Confinement
+from tisim.effects.walls.confinement import Confinement
 from tisim.numerics.vectors import piece
 from tisim.pairs.listed_pairs import ExportedTerms
 from tisim.pairs.pair_sum import ListedLaws, PairSum

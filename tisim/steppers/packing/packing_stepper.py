@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option, parameter
-from tisim.effects.base import Confinement, Effect, HardBodies, SceneParts
-from tisim.effects.base.confinement import confinement
+from tisim.effects.base import Effect, HardBodies, SceneParts
+from tisim.effects.walls.confinement import Confinement, confinement
 from tisim.errors import must
 from tisim.numerics import elementary
 from tisim.numerics.vectors import product

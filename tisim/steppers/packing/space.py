@@ -1,7 +1,7 @@
 """The space in which a packing stepper packs bodies: a periodic box, or a container in it."""
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Confinement
+from tisim.effects.walls.confinement import Confinement
 from tisim.numerics import elementary
 from tisim.program.phases import PerParticle
 from tisim.state.status import WorldStatus

@@ -1,10 +1,13 @@
 """Hard walls around hard bodies."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
+import numpy as np
+
 from tisim.components.component import Component, option
-from tisim.effects.base.effect import Effect, SceneParts
+from tisim.effects.base import Effect, HardBodies, SceneParts
+from tisim.effects.base.shaped import LENGTH_TOLERANCE
 from tisim.errors import Words, must
 from tisim.geometry.container import Container
 from tisim.geometry.round_containers import CylindricalContainer
@@ -44,11 +47,35 @@ class Confinement(Effect):
         must(fits, "domain", rule, Words(f"{scene.domain.kind()}, periodic along {_axes(joined)}"))
         if low is not None and high is not None:
             container.check_box(high - low)
+        held = hard_bodies(scene)
+        rule = f"one with hard bodies beside {self.kind()}, such as hard_rods"
+        must(bool(held), "effects", rule, [effect.label for effect in scene.effects])
+        for bodies in held:
+            rule = f"rods or spheres in a {container.kind()}, as round ends touch curved walls"
+            must(bodies.round_ends or not container.curved, f"effects.{bodies.label}", rule, bodies.kind())
+            exact = self.treatment == "exact"
+            known = bodies.offers("support") and (exact or bodies.offers("closest_virtual"))
+            must(known, f"effects.{self.label}.treatment", f"one for {bodies.kind()}", self.treatment)
+
+    def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
+        if not any(self.container.scaled()):
+            return
+        for bodies in hard_bodies(scene):
+            sizes = bodies.sizes(start)
+            if len(sizes):
+                same = float(np.ptp(sizes)) <= LENGTH_TOLERANCE * float(sizes.max())
+                rule = f"in one ratio to their shapes, as the {self.container.kind()} grows with them"
+                must(same, "particles.radius", rule, float(sizes.max() / sizes.min()))
 
 
 def confinement(scene: SceneParts) -> Confinement | None:
     """Return the confinement of a scene; None without walls."""
     return next((effect for effect in scene.effects if isinstance(effect, Confinement)), None)
+
+
+def hard_bodies(scene: SceneParts) -> list[HardBodies]:
+    """Return the effects of hard bodies in a scene."""
+    return [effect for effect in scene.effects if isinstance(effect, HardBodies)]
 
 
 def _axes(chosen: Iterable[bool]) -> str:

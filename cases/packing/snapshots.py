@@ -1,0 +1,103 @@
+"""Pictures of packings, their bodies coloured by contacts, and the directions of rods in wedges."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.analysis.packings.wall_alignment import direction_histogram
+from tisim.cases.packing.measures import contact_counts
+from tisim.cases.packing.studies import PackedRow, shortest
+from tisim.plotting.bodies import draw_bodies
+from tisim.plotting.packings import directions
+from tisim.plotting.style import empty
+
+MOST_CONTACTS = 12
+"""Number of contacts from which colours do not change."""
+SEGMENT = 8.0
+"""Length (D) of the drawn part of a cylinder."""
+DIRECTION_BINS = (8, 20)
+"""Bins of the cosine of the polar angle, and of the azimuth, of 4.5 degrees each."""
+ACUTE, LONG = 9.0, 3.0
+"""Angle of the wedge (degrees) and aspect ratio of B16 Fig. 2.15."""
+Packing = tuple[PackedRow, PackedBodies]
+"""A line of a study, and its bodies."""
+
+
+def draw_by_contacts(axis: Axes, packing: PackedBodies, kept: np.ndarray | None = None) -> None:
+    """Draw a packing, or some of its bodies, each coloured by its number of contacts."""
+    colours = colormaps["viridis"](np.clip(contact_counts(packing) / MOST_CONTACTS, 0, 1))[:, :3]
+    some = np.ones(len(packing), bool) if kept is None else kept
+    draw_bodies(axis, packing.where(some), colours[some])
+
+
+def contact_scale(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Add the scale of colours by contacts."""
+    mappable = ScalarMappable(Normalize(0, MOST_CONTACTS), colormaps["viridis"])
+    figure.colorbar(mappable, ax=list(axes), shrink=0.6, label="contacts")
+
+
+def snapshots(
+    packings: Sequence[Packing], title: Callable[[PackedRow], str], columns: int, height: float
+) -> Figure:
+    """Draw packings, with packing fraction and contact number. height : of a row, inches."""
+    rows = -(-len(packings) // columns)
+    figure = empty(2.4 * columns + 0.8, height * rows)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axis in axes[len(packings) :]:
+        axis.set_axis_off()
+    for axis, (row, bodies) in zip(axes, packings, strict=False):
+        unit = float(bodies.diameters()[0])
+        kept = bodies.position[:, 2] - bodies.low[2] < SEGMENT * unit if row.study == "cylinder" else None
+        draw_by_contacts(axis, bodies, kept)
+        axis.set_title(f"{title(row)}\n$\\phi$ = {row.fraction:.3f}, $C$ = {row.touching:.2f}", fontsize=9)
+    contact_scale(figure, list(axes))
+    return figure
+
+
+def firsts(packings: Sequence[Packing]) -> list[Packing]:
+    """Return the packings of the first seed."""
+    return [(row, bodies) for row, bodies in packings if row.seed == 0]
+
+
+def in_cylinders(packings: Sequence[Packing]) -> Figure:
+    """Draw spheres and rods in cylinders (B16 Fig. 2.11)."""
+    some = [(row, bodies) for row, bodies in firsts(packings) if row.shape <= LONG]
+    columns = len({row.width for row, _ in some})
+    return snapshots(
+        some, lambda row: rf"$\Lambda$ = {row.shape:g}, $D_{{cyl}}$ = {row.width:g} D", columns, 3.6
+    )
+
+
+def in_wedges(packings: Sequence[Packing]) -> Figure:
+    """Draw rods in wedges (B16 Fig. 2.16)."""
+    some = [(row, bodies) for row, bodies in firsts(packings) if row.shape <= LONG]
+    columns = len({(row.angle, round(row.width / shortest(row.shape, row.angle), 6)) for row, _ in some})
+    return snapshots(some, lambda row: rf"$\Lambda$ = {row.shape:g}, {row.angle:g}°", columns, 2.8)
+
+
+def of_superballs(packings: Sequence[Packing]) -> Figure:
+    """Draw superballs (B16 Fig. 4.6)."""
+    some = firsts(packings)
+    return snapshots(some, lambda row: rf"$\gamma$ = {row.shape:g}", len(some), 3.2)
+
+
+def wedge_directions(packings: Sequence[Packing]) -> Figure:
+    """Draw the directions of rods in acute wedges, of all seeds together (B16 Fig. 2.15)."""
+    axes: dict[float, list[np.ndarray]] = {}
+    for row, bodies in packings:
+        if row.shape == LONG and row.angle == ACUTE:
+            axes.setdefault(row.width, []).append(bodies.axes()[:, 2])
+    return directions(
+        {
+            f"{width / shortest(LONG, ACUTE):.2g} $l_{{w,min}}$": direction_histogram(
+                np.concatenate(axes[width]), DIRECTION_BINS
+            )
+            for width in sorted(axes)
+        }
+    )

@@ -1,0 +1,74 @@
+"""Make the packings of B16 chapters 2 to 4, print their numbers beside the published ones, and draw their
+figures: the tables and figures of docs/packing_study.md.
+
+    python -m tests.benchmarks.packing_studies FOLDER [STUDY ...]
+
+Each packing is added to FOLDER/STUDY.csv as it ends, and is not made again, so a command that was stopped
+goes on where it was.
+"""
+
+import sys
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+import tisim
+from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.cases.packing.comparisons import compared
+from tisim.cases.packing.figures import drawn, starts_of
+from tisim.cases.packing.studies import STUDIES, PackedRow, measured_packings, plan_of, plans, read, table
+
+SIZE = "default"
+
+
+def bodies_file(folder, row):
+    """The file with the bodies of a packing."""
+    return folder / f"{sha256(repr(row.key()).encode()).hexdigest()[:16]}.npz"
+
+
+def pack(study, folder):
+    """Make the packings that the table does not have, and add each to it."""
+    file = folder / f"{study}.csv"
+    rows = read(file.read_text()) if file.exists() else []
+    with file.open("a") as lines:
+        if not rows:
+            lines.write(table([]))
+        made = {one.key() for one in rows}
+        for row, one in measured_packings(plans(study), SIZE, starts_of(study, SIZE), made=made):
+            names = ("position", "orientation", "scale", "low", "high", "periodic")
+            np.savez(bodies_file(folder, row), **{name: getattr(one.bodies, name) for name in names})
+            lines.write(table([row]).split("\n", 1)[1])
+            lines.flush()
+
+
+def packings(study, folder):
+    """The lines of a study, and their bodies."""
+    made = []
+    for row in read((folder / f"{study}.csv").read_text()):
+        with np.load(bodies_file(folder, row)) as kept:
+            given = {name: kept[name] for name in kept.files}
+        periodic = tuple(map(bool, given.pop("periodic")))
+        made.append((row, PackedBodies.of(plan_of(row).body(), **given, periodic=periodic)))
+    return made
+
+
+def main(folder, *studies):
+    """Make some studies, or all, and print and draw all that are there."""
+    tisim.init(threads=1)
+    place = Path(folder)
+    place.mkdir(exist_ok=True)
+    for study in studies or STUDIES:
+        pack(study, place)
+    made = {study: packings(study, place) for study in STUDIES if (place / f"{study}.csv").exists()}
+    free = [row for row, _ in made.get("aspect ratio", [])]
+    for study, some in made.items():
+        print(f"\n{study}: {len(some)} packings")
+        for line in compared(study, sorted((row for row, _ in some), key=PackedRow.place), free):
+            print(line)
+    for name, figure in drawn(made).items():
+        figure.savefig(place / name, dpi=80)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,49 @@
+"""Scenes that are loaded into a kept simulation, for callers that change states between parts of a run."""
+
+import numpy as np
+import pytest
+
+from tisim import Box, Cloud, Scene, run
+from tisim.effects import Gravity
+from tisim.engine.batches import loaded
+from tisim.errors import InputError
+from tisim.steppers import FixedStep, Verlet
+
+
+def falling(seed, **changes):
+    """A scene of five particles that fall."""
+    parts = {
+        "particles": Cloud(number=5, radius=1e-4, density=1e3),
+        "effects": [Gravity()],
+        "domain": Box(low=(-1.0, -1.0, -1.0), high=(1.0, 1.0, 1.0)),
+        "duration": 1e-2,
+        "stepper": Verlet(control=FixedStep(dt=1e-3)),
+        "seed": seed,
+    }
+    return Scene(**{**parts, **changes})
+
+
+def test_a_simulation_is_kept_and_gives_the_bits_of_run():
+    scenes = [falling(seed) for seed in range(2)]
+    kept = []
+    for one in scenes:
+        with loaded([one]) as simulation:
+            simulation.run(until=5e-3)
+            simulation.run()
+            (result,) = simulation.results()
+            kept.append(simulation)
+        assert np.array_equal(result.state["position"], run(one).state["position"])
+    assert kept[0] is kept[1]
+
+
+def test_a_start_is_loaded_whatever_was_done_before():
+    one = falling(3)
+    with loaded([one]) as simulation:
+        simulation.states[0]["velocity"] = np.full((5, 3), 2.0)
+    with loaded([one]) as simulation:
+        assert np.array_equal(simulation.states[0]["velocity"], one.start()["velocity"])
+    with (
+        pytest.raises(InputError, match="structure"),
+        loaded([one, falling(4, stepper=Verlet(control=FixedStep(dt=1e-3)), effects=[])]),
+    ):
+        pass
