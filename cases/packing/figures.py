@@ -9,6 +9,7 @@ from matplotlib.ticker import MaxNLocator
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.packing import curves, snapshots
+from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.snapshots import Packing
 from tisim.cases.packing.studies import PackedRow, Study, measured_packings, plans, table
 from tisim.engine.batches import Progress, progress_of_part
@@ -29,7 +30,7 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     figure = empty(10.4, 5.0)
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
     snapshots.draw_by_contacts(left, last)
-    numbers = np.bincount(snapshots.contact_counts(last))
+    numbers = np.bincount(contact_counts(last))
     contacts = np.arange(len(numbers))
     right.bar(contacts, numbers, color=snapshots.contact_colours(contacts))
     right.set(xlabel="contacts of a body, and colour", ylabel="bodies")

@@ -9,9 +9,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from tisim.analysis.packings.gaps import near_gaps, relative_gaps
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.wall_alignment import direction_histogram
+from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.studies import PackedRow, shortest
 from tisim.plotting.bodies import draw_bodies
 from tisim.plotting.packings import directions
@@ -19,8 +19,6 @@ from tisim.plotting.style import empty
 
 MOST_CONTACTS = 12
 """Number of contacts from which colours do not change."""
-TOUCHING_GAP = 1e-3
-"""Gap (D) up to which bodies count as touching in a picture, more than the tolerance of a packing."""
 SEGMENT = 8.0
 """Length (D) of the drawn part of a cylinder."""
 DIRECTION_BINS = (8, 20)
@@ -29,13 +27,6 @@ ACUTE, LONG = 9.0, 3.0
 """Angle of the wedge (degrees) and aspect ratio of B16 Fig. 2.15."""
 Packing = tuple[PackedRow, PackedBodies]
 """A line of a study, and its bodies."""
-
-
-def contact_counts(packing: PackedBodies) -> np.ndarray:
-    """Return the number of bodies that each body touches, shape (n,)."""
-    gaps = near_gaps(packing, float(TOUCHING_GAP * packing.diameters().max()))
-    pairs = gaps.pairs[relative_gaps(packing, gaps) <= TOUCHING_GAP]
-    return np.bincount(pairs.ravel(), minlength=len(packing))
 
 
 def contact_colours(contacts: np.ndarray) -> np.ndarray:

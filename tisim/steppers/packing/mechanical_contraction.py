@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, HardBodies, SceneParts
 from tisim.errors import must
@@ -86,6 +87,30 @@ class MechanicalContraction(PackingStepper):
         WorldField("box_volume", "real"),
         WorldField("volume_decrease", "real"),
     )
+
+    @property
+    def accuracy_parameters(self) -> tuple[AccuracyParameter, ...]:  # type: ignore[override]
+        # The distance from the jamming density is measured to fall as attempts^-0.5 (docs/packings.md). The
+        # other settings have no order; they change the number of attempts that are needed.
+        moved = (AccuracyParameter(motion=1, converges=False),) if self.method == "revised" else ()
+        return (
+            AccuracyParameter(attempts=-0.5, converges=False),
+            AccuracyParameter(volume_step=1, converges=False),
+            AccuracyParameter(tolerance=1, converges=False),
+            *moved,
+        )
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        hard = [effect for effect in effects if isinstance(effect, HardBodies)]
+        if not hard:
+            return ()
+        rods = all(shape.rod() for shape in hard[0].shapes())
+        return (cls(method="original" if rods else "revised", attempts=2000),)
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Any, ...]:
+        other = "original" if self.method == "revised" else "revised"
+        return (self.model_copy(update={"method": other}), *super().rivals(effects, dt))
 
     def check(self, scene: SceneParts) -> None:
         super().check(scene)

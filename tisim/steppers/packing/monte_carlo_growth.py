@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects.base import Effect, HardBodies
 from tisim.numerics import philox
@@ -79,6 +80,11 @@ class MonteCarloGrowth(PackingStepper):
     precision: float = parameter("D", "length of trial moves below which a world ends", 1e-4, gt=0)
     acceptance: float = parameter("", "fraction of trial moves that are accepted", 0.2, gt=0, lt=1)
 
+    # Slow growth leaves time for order, so there is no limit of random packings.
+    accuracy_parameters: ClassVar = (
+        AccuracyParameter(precision=1, converges=False),
+        AccuracyParameter(rate=1, converges=False),
+    )
     random: ClassVar = True
     confines: ClassVar = False
     world_fields: ClassVar = (
@@ -90,6 +96,10 @@ class MonteCarloGrowth(PackingStepper):
         WorldField("largest_radius", "real", "m"),
         WorldField("least_room", "real"),
     )
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        return (cls(precision=1e-3),) if any(isinstance(effect, HardBodies) for effect in effects) else ()
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
         return (CONFLICT, CROWDING, OVERLAP_FLAG)

@@ -81,6 +81,11 @@ class PackingStepper(Stepper):
     def independent(self, effects: Sequence[Effect]) -> bool:
         return False
 
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Any, ...]:
+        # Other protocols, by name, so that the order does not depend on imports.
+        kinds = [kind for _, kind in sorted(PackingStepper.known().items()) if kind is not type(self)]
+        return tuple(other for kind in kinds for other in kind.alternatives(effects, dt))
+
 
 @ti.func
 def rotated_by(turn, orientation):
