@@ -62,7 +62,7 @@ MEANINGS = {
 FEWEST_LARGE = 20
 """Least number of larger bodies of a mixture. Fewer of them jam at densities that differ by a tenth."""
 DENSE, SLENDER = 0.8, 4.0
-"""Packing fractions that are not expected to be exceeded: DENSE, and SLENDER over the aspect ratio of a body."""
+"""Packing fractions that are not expected to be exceeded: DENSE, and SLENDER over the aspect ratio."""
 SEARCH_START = 0.2
 """Packing fraction of the start of a design."""
 QUICK = EnergyMinimisation(precision=1e-3, tolerance=1e-3, patience=100, fraction_step=0.03)

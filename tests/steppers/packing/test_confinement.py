@@ -273,6 +273,9 @@ def test_a_container_grows_with_its_bodies(container):
             centre = 0.0 if container is WEDGE else side / 2
             moved = centre + np.where(scaled, growth, 1.0) * (before["position"] - centre)
             np.testing.assert_allclose(after["position"], moved, rtol=0, atol=1e-12)
+            (measures,) = simulation.measures([0])
+            solid = 48 * SPHERE.volume() * (2 * after["radius"][0]) ** 3
+            assert measures["packing_fraction"] == pytest.approx(solid / volumes[1], rel=1e-9)
             checked += 1
     assert checked > 3
     simulation.close()

@@ -34,6 +34,7 @@ from tisim.steppers.packing.packing_stepper import (
     BeginAttempt,
     MoveOrReturn,
     PackingStepper,
+    body_volume,
 )
 from tisim.steppers.packing.space import CheckWidth, PackingSpace
 from tisim.steppers.verlet import Advance
@@ -61,7 +62,7 @@ class MechanicalContraction(PackingStepper):
     as a contracting box up to the scale of all lengths. A cylinder or a wedge grows with the bodies, except
     along its periodic axis. If overlaps remain after ``attempts``, the world returns to its last
     configuration without overlaps, and contracts by half the step. It ends in that configuration after
-    ``halvings``.
+    ``halvings``. The measure ``packing_fraction`` of the result is its density.
 
     The original method is for rods. Overlaps of the start are removed first.
 
@@ -86,6 +87,8 @@ class MechanicalContraction(PackingStepper):
         WorldField("halved", "integer"),
         WorldField("box_volume", "real"),
         WorldField("volume_decrease", "real"),
+        WorldField("solid_volume", "real"),
+        WorldField("packing_fraction", "measure"),
     )
 
     @property
@@ -169,7 +172,12 @@ class ChooseAction(Phase):
     def run(self, w, _k):
         s = self.s
         if s.steps[w] == 0:
-            s.box_volume[w] = self.space.volume(w, self.bodies.size(s, w, 0) * self.bodies.unit(w, 0))
+            unit = self.bodies.size(s, w, 0) * self.bodies.unit(w, 0)
+            s.box_volume[w] = self.space.volume(w, unit)
+            # In D^3, so it stays the same while bodies grow.
+            s.solid_volume[w] = ti.cast(0.0, ti.f64)
+            for i in range(s.count[w]):
+                s.solid_volume[w] += body_volume(s, self.bodies, w, i) / ti.cast(unit, ti.f64) ** 3
             s.volume_decrease[w] = ti.cast(self.stepper.volume_step(w), ti.f64)
         last = s.end[w] - s.time[w] <= ti.cast(1.5, ti.f64) * ti.cast(self.control.dt(w), ti.f64)
         volume, ends = s.box_volume[w], False
@@ -201,6 +209,7 @@ class ChooseAction(Phase):
                 s.volume_decrease[w] = ti.min(s.volume_decrease[w], 0.5 * volume)
                 s.box_volume[w] = volume - s.volume_decrease[w]
                 s.growth[w] = self.space.growth(volume, s.box_volume[w])
+        s.packing_fraction[w] = s.solid_volume[w] / s.box_volume[w]
         if ends:
             s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
 
