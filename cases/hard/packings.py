@@ -124,8 +124,8 @@ def each_in(scenes: Sequence[Scene]) -> list[Result]:
     "One sphere or one rod alone in a periodic box would touch its own images; inside a sphere it has only "
     "the wall.",
     Criterion("in a periodic box: words missing from the messages", 0, 0),
-    Criterion("inside a sphere: packing fraction of a sphere, largest difference from 1", 1e-3),
-    Criterion("inside a sphere: packing fraction of a rod, largest difference from its closed form", 1e-3),
+    Criterion("inside a sphere: fraction of a sphere, difference from 1", 1e-3),
+    Criterion("inside a sphere: fraction of a rod, difference from its closed form", 1e-3),
     Criterion("inside a sphere: deepest overlap with the wall, D", PERMITTED),
 )
 def one_body():
