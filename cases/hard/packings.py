@@ -97,7 +97,8 @@ def deepest_in_walls(results: Sequence[Result]) -> float:
     """Return the deepest overlap of a body with a wall, D."""
     found = []
     for result in results:
-        bodies, (_, around) = PackedBodies.from_result(result), result.scene.effects
+        bodies = PackedBodies.from_result(result)
+        (around,) = (one for one in result.scene.effects if isinstance(one, Confinement))
         size, side = float(bodies.scale[0]), bodies.high - bodies.low
         places = bodies.position - bodies.low
         gaps = wall_gaps(bodies.shapes[0], places, bodies.orientation, around.container, side, size)
