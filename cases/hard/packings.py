@@ -97,7 +97,8 @@ def deepest_in_walls(results: Sequence[Result]) -> float:
     """Return the deepest overlap of a body with a wall, D."""
     found = []
     for result in results:
-        bodies, (_, around) = PackedBodies.from_result(result), result.scene.effects
+        bodies = PackedBodies.from_result(result)
+        (around,) = (one for one in result.scene.effects if isinstance(one, Confinement))
         size, side = float(bodies.scale[0]), bodies.high - bodies.low
         places = bodies.position - bodies.low
         gaps = wall_gaps(bodies.shapes[0], places, bodies.orientation, around.container, side, size)
@@ -124,8 +125,8 @@ def each_in(scenes: Sequence[Scene]) -> list[Result]:
     "One sphere or one rod alone in a periodic box would touch its own images; inside a sphere it has only "
     "the wall.",
     Criterion("in a periodic box: words missing from the messages", 0, 0),
-    Criterion("inside a sphere: packing fraction of a sphere, largest difference from 1", 1e-3),
-    Criterion("inside a sphere: packing fraction of a rod, largest difference from its closed form", 1e-3),
+    Criterion("inside a sphere: fraction of a sphere, difference from 1", 1e-3),
+    Criterion("inside a sphere: fraction of a rod, difference from its closed form", 1e-3),
     Criterion("inside a sphere: deepest overlap with the wall, D", PERMITTED),
 )
 def one_body():
