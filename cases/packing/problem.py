@@ -62,7 +62,7 @@ MEANINGS = {
 FEWEST_LARGE = 20
 """Least number of larger bodies of a mixture. Fewer of them jam at densities that differ by a tenth."""
 DENSE, SLENDER = 0.8, 4.0
-"""Packing fractions that are not expected to be exceeded: DENSE, and SLENDER over the aspect ratio of a body."""
+"""Packing fractions that are not expected to be exceeded: DENSE, and SLENDER over the aspect ratio."""
 SEARCH_START = 0.2
 """Packing fraction of the start of a design."""
 QUICK = EnergyMinimisation(precision=1e-3, tolerance=1e-3, patience=100, fraction_step=0.03)
@@ -75,7 +75,7 @@ LONGEST_RUN = 1e6
 
 
 @dataclass(frozen=True)
-class Design:
+class PackingDesign:
     """The bodies of a design: a shape in two sizes.
 
     ratio : of the two sizes. share : of the volume, that the larger bodies have. number : least number of
@@ -155,7 +155,7 @@ def problem(size: str = "default", variant: str = "densest") -> Problem:
 
     def scene(design: Mapping[str, float], seed: int) -> Scene:
         sizes = design.get("size_ratio", 1.0), design.get("large_share", 1.0)
-        return Design(shape_of(design), *sizes, **limits).scene(seed)
+        return PackingDesign(shape_of(design), *sizes, **limits).scene(seed)
 
     return Problem(
         name=f"packing-{variant}" + ("" if size == "default" else f"-{size}"),
