@@ -29,9 +29,14 @@ Packing = tuple[PackedRow, PackedBodies]
 """A line of a study, and its bodies."""
 
 
+def contact_colours(contacts: np.ndarray) -> np.ndarray:
+    """Return the colours (red, green, blue) of numbers of contacts, shape (n, 3)."""
+    return np.asarray(colormaps["viridis"](np.clip(contacts / MOST_CONTACTS, 0, 1))[:, :3])
+
+
 def draw_by_contacts(axis: Axes, packing: PackedBodies, kept: np.ndarray | None = None) -> None:
     """Draw a packing, or some of its bodies, each coloured by its number of contacts."""
-    colours = colormaps["viridis"](np.clip(contact_counts(packing) / MOST_CONTACTS, 0, 1))[:, :3]
+    colours = contact_colours(contact_counts(packing))
     some = np.ones(len(packing), bool) if kept is None else kept
     draw_bodies(axis, packing.where(some), colours[some])
 

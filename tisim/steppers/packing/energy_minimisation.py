@@ -249,11 +249,10 @@ class MinimiseOrGrow(Phase):
         s = self.s
         density, jammed = s.packing_fraction[w], s.jammed_fraction[w]
         aim = density + ti.cast(self.stepper.fraction_step(w), ti.f64)
-        ends = last
         if jammed > 0.0:
             aim = 0.5 * (density + jammed)
-            ends = ends or jammed - density <= ti.cast(self.stepper.precision(w), ti.f64)
-        if ends:
+            s.jammed[w] = ti.cast(jammed - density <= ti.cast(self.stepper.precision(w), ti.f64), ti.i64)
+        if last or s.jammed[w] == 1:
             s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
         elif density > 0.0:
             s.growth[w] = self.space.growth(aim, density)
