@@ -17,7 +17,7 @@ from tisim.steppers import EnergyMinimisation, MechanicalContraction, Stepper
 
 ATTEMPTS = (20, 60, 200, 600, 2000)
 ATTEMPT_STARTS = 24
-NUMBERS = {32: 96, 64: 96, 128: 48, 256: 24, 512: 12}
+NUMBERS = {32: 96, 64: 96, 128: 48, 256: 16}
 """Number of spheres and of random starts."""
 OTHER_SETTINGS = {
     "": {},

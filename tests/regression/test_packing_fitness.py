@@ -13,10 +13,10 @@ from tisim.cases.packing.problem import problem
 
 STARTS = 16
 DENSE = {
-    (1.0, 1.0, 0.5): (0.0, 0.0),
-    (1.4, 1.0, 0.5): (0.0, 0.0),
-    (3.0, 1.0, 0.5): (0.0, 0.0),
-    (1.0, 2.0, 0.7): (0.0, 0.0),
+    (1.0, 1.0, 0.5): (0.62193, 0.00375),
+    (1.4, 1.0, 0.5): (0.68932, 0.00244),
+    (3.0, 1.0, 0.5): (0.64021, 0.00238),
+    (1.0, 2.0, 0.7): (0.65996, 0.00139),
 }
 """Aspect ratio, size ratio, share of the larger bodies -> mean packing fraction, and its standard error."""
 

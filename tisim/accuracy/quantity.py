@@ -141,8 +141,8 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     if scene.stepper.packs:
         rule = "given, as walls bound the packing"
         must(all(scene.domain.joined()), "quantities", rule, Words("none"))
-        starts = [scene.start(scene.seed + k) for k in (0, 1)]
-        differ = any(not np.array_equal(*(start[name] for start in starts)) for name in starts[0])
+        one, other = (scene.start(scene.seed + k) for k in (0, 1))
+        differ = any(not np.array_equal(one[name], other[name]) for name in one)
         return (Quantity("packing fraction", packed_fraction, random=differ),)
     if scene.stepper.random:
         must(

@@ -180,7 +180,8 @@ def _turning(
     starts: int,
     numbers: tuple[str, str] = USUAL_NUMBERS,
 ) -> SettingSweep:
-    settings, weights = [], []
+    settings: list[Setting] = []
+    weights: list[float] = []
     for decades in levels:
         try:
             changed = turned(scene, path, accuracy_parameter, decades)

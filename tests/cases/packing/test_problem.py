@@ -7,7 +7,7 @@ from tisim import InputError, optimize, run
 from tisim.cases.case import every
 from tisim.cases.packing import problem as searching
 from tisim.cases.packing.measures import fraction_of
-from tisim.cases.packing.problem import FEWEST_LARGE, Design, details, problem, shape_of
+from tisim.cases.packing.problem import FEWEST_LARGE, PackingDesign, details, problem, shape_of
 from tisim.cases.packing.scene import rod
 from tisim.shapes import SuperquadricShape
 
@@ -42,7 +42,7 @@ def test_a_design_makes_its_packing():
 def test_long_bodies_need_more_of_them():
     """A box with the expected density is at least twice as wide as the largest body is long."""
     for aspect, ratio, share in ((1.0, 1.0, 1.0), (5.0, 1.0, 1.0), (2.0, 2.0, 0.8), (1.0, 2.0, 0.3)):
-        design = Design(rod(aspect), ratio, share, number=10, most=2000)
+        design = PackingDesign(rod(aspect), ratio, share, number=10, most=2000)
         number, volume = design.bodies(), rod(aspect).volume()
         large = number * (share / ratio**3) / (share / ratio**3 + 1 - share)
         side = np.cbrt(large * ratio**3 * volume / share / min(0.8, 4 / aspect))
