@@ -27,8 +27,8 @@ on another page.
 """  # noqa: E501
 MEANING = """
 *Works*: it is used in a scene, and a test or a check holds it. *In part*: some of it, or another size, or without a
-conclusion of the source; the row says which. *Left out*: not there, with the reason. {later} rows belong to two parts
-of B16 that are not built yet: random packings (chapters 1 to 4) and the filter of packed fibres (chapter 7).
+conclusion of the source; the row says which. *Left out*: not there, with the reason. {later} rows belong to a part
+of B16 that is not built yet: the filter of packed fibres (chapter 7).
 {laboratory} rows are laboratory work. Of the other {others} rows, {whole} work.
 """  # noqa: E501
 NUMBERS = r"""

@@ -14,9 +14,9 @@ from tisim.cases.packing.studies import PackedRow, Study, means, shortest
 
 CONTACTS_OF_RODS = 10.0
 """Contact number of the random contact equation phi L/D = <C>/2 = 5 for thin rods."""
-FEWEST_CONTACTS = 2.0
+CONTACTS_IN_FILE = 2.0
 """Contact number at which <C>* of B16 is 0."""
-WIDE = 3.5
+WIDE_CYLINDER = 3.5
 """Diameter (D) from which the packing fraction in a cylinder is taken as linear in 1/D_cyl."""
 
 
@@ -48,10 +48,11 @@ def of(rows: Sequence[PackedRow], name: str) -> Mean:
     return Mean.of([getattr(one, name) for one in rows])
 
 
-def scaled(one: Mean, full: Mean, low: float = FEWEST_CONTACTS) -> Mean:
+def scaled(one: Mean, full: Mean, low: float = CONTACTS_IN_FILE) -> Mean:
     """Return a mean as a part of the range from ``low`` to ``full``."""
-    none = Mean(low, 0.0)
-    return one.minus(none).over(full.minus(none))
+    span = full.value - low
+    part = (one.value - low) / span
+    return Mean(part, math.hypot(one.half, part * full.half) / span)
 
 
 def shortest_fraction(aspect: float, angle: float) -> float:
@@ -148,7 +149,7 @@ def of_cylinders(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterat
         )
         contacts = [one.contacts for one in some if one.width < 2]
         yield Compared(f"<C> below 2 D, {who}", "2", text(Mean.of(contacts)))
-        wide = [one for one in some if one.width >= WIDE]
+        wide = [one for one in some if one.width >= WIDE_CYLINDER]
         fit = linregress([1 / one.width for one in wide], [one.fraction for one in wide])
         half = 2.0 * float(fit.intercept_stderr)
         here = f"{text(Mean(float(fit.intercept), half))}; periodic {text(full['fraction'])}"

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from tisim.analysis import Mean
 from tisim.analysis.packings.orientational_order import random_nematic_order
 from tisim.cases.packing.comparisons import (
+    CONTACTS_IN_FILE,
     CONTACTS_OF_RODS,
-    FEWEST_CONTACTS,
     chosen,
     periodic,
     scaled,
@@ -29,18 +29,24 @@ TICKS = (1, 1.5, 2, 3, 5, 10, 25, 50, 100)
 """Marked aspect ratios."""
 FRACTIONS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
 """Marked packing fractions of long rods."""
+LONGEST_SHORT = 10.0
+"""Aspect ratio from which the density of thin rods is drawn, on a logarithmic axis."""
 SPHERES = 0.64
 """Packing fraction of random close packing of spheres."""
 Curve = Mapping[float, Mean]
 """Means by the value on the abscissa."""
 
 
-def draw(axis: Axes, curves: Mapping[str, Curve]) -> None:
-    """Draw means with their 95 % intervals, one line for each label."""
-    for colour, (label, curve) in zip(COLOURS, curves.items(), strict=False):
+def draw(axis: Axes, curves: Mapping[str, Curve], labels: Sequence[str] | None = None) -> None:
+    """Draw means with their 95 % intervals, one line for each label. labels : in the order of colours, if
+    there are more than curves."""
+    colours = dict(zip(labels or curves, COLOURS, strict=False))
+    for label, curve in curves.items():
         half = [one.half if np.isfinite(one.half) else 0.0 for one in curve.values()]
         mean = [one.value for one in curve.values()]
-        axis.errorbar(list(curve), mean, half, fmt="o-", ms=3, lw=1, color=colour, capsize=2, label=label)
+        axis.errorbar(
+            list(curve), mean, half, fmt="o-", ms=3, lw=1, color=colours[label], capsize=2, label=label
+        )
     plain(axis)
 
 
@@ -72,8 +78,8 @@ def of_rods(rows: Sequence[PackedRow]) -> Figure:
     figure = panels(rows, "shape", r"aspect ratio $\Lambda = L/D + 1$", "method", "{}")
     figure.axes[0].axhline(SPHERES, color="0.6", lw=0.8)
     longest = max(one.shape for one in rows)
-    if longest > 8:
-        aspect = np.geomspace(8.0, longest, 50)
+    if longest > LONGEST_SHORT:
+        aspect = np.geomspace(LONGEST_SHORT, longest, 50)
         figure.axes[0].plot(aspect, CONTACTS_OF_RODS / 2 / (aspect - 1), color="0.6", lw=0.8, ls="--")
         figure.axes[0].set_ylim(0.8 * min(one.fraction for one in rows), 1.0)
         figure.axes[0].set_yscale("log")
@@ -125,7 +131,7 @@ def of_cylinders(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Figure
     label = r"$\Lambda$ = {:g}"
     aspects = sorted({one.shape for one in rows})
     of = {aspect: chosen(rows, shape=aspect) for aspect in aspects}
-    fraction, contacts, order, inverse = ({} for _ in range(4))  # type: ignore[var-annotated]
+    fraction, contacts, order, inverse = ({} for _ in range(4))
     for aspect, some in of.items():
         full = periodic(free, aspect)
         of_width: dict[str, dict[float, Mean]] = {
@@ -135,7 +141,9 @@ def of_cylinders(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Figure
         key = label.format(aspect)
         fraction[key] = {at: one.over(full["fraction"]) for at, one in of_width["fraction"].items()}
         contacts[key] = {at: scaled(one, full["contacts"]) for at, one in of_width["contacts"].items()}
-        order[key] = {at / aspect: one for at, one in of_width["nematic"].items()}
+        if aspect > 1:
+            # Axes of spheres have no meaning.
+            order[key] = {at / aspect: one for at, one in of_width["nematic"].items()}
         inverse[key] = {
             **{1 / at: one for at, one in of_width["fraction"].items()}, 0.0: full["fraction"]
         }  # fmt: skip
@@ -146,7 +154,7 @@ def of_cylinders(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Figure
         (inverse, r"$D/D_{cyl}$", "packing fraction"),
     )
     for axis, (curves, xlabel, ylabel) in zip(axes, drawn, strict=True):
-        draw(axis, curves)
+        draw(axis, curves, [label.format(aspect) for aspect in aspects])
         axis.set(xlabel=xlabel, ylabel=ylabel)
     axes[0].axhline(1.0, color="0.6", lw=0.8)
     axes[1].axhline(1.0, color="0.6", lw=0.8)
@@ -197,4 +205,4 @@ def wedge_fraction(one: Mean, full: Mapping[str, Mean], aspect: float, angle: fl
 
 def wedge_contacts(one: Mean, full: Mapping[str, Mean], *_: float) -> Mean:
     """Return C* of B16: 0 at two contacts, 1 at the periodic value."""
-    return scaled(one, full["contacts"], FEWEST_CONTACTS)
+    return scaled(one, full["contacts"], CONTACTS_IN_FILE)

@@ -48,11 +48,11 @@ def contact_scale(figure: Figure, axes: Sequence[Axes]) -> None:
 
 
 def snapshots(
-    packings: Sequence[Packing], title: Callable[[PackedRow], str], columns: int, height: float
+    packings: Sequence[Packing], title: Callable[[PackedRow], str], columns: int, width: float, height: float
 ) -> Figure:
-    """Draw packings, with packing fraction and contact number. height : of a row, inches."""
+    """Draw packings, with packing fraction and contact number. width, height : of a picture, inches."""
     rows = -(-len(packings) // columns)
-    figure = empty(2.4 * columns + 0.8, height * rows)
+    figure = empty(width * columns + 0.8, height * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for axis in axes[len(packings) :]:
         axis.set_axis_off()
@@ -74,22 +74,20 @@ def in_cylinders(packings: Sequence[Packing]) -> Figure:
     """Draw spheres and rods in cylinders (B16 Fig. 2.11)."""
     some = [(row, bodies) for row, bodies in firsts(packings) if row.shape <= LONG]
     columns = len({row.width for row, _ in some})
-    return snapshots(
-        some, lambda row: rf"$\Lambda$ = {row.shape:g}, $D_{{cyl}}$ = {row.width:g} D", columns, 3.6
-    )
+    return snapshots(some, lambda row: rf"$D_{{cyl}}$ = {row.width:g} D", columns, 1.6, 3.4)
 
 
 def in_wedges(packings: Sequence[Packing]) -> Figure:
     """Draw rods in wedges (B16 Fig. 2.16)."""
     some = [(row, bodies) for row, bodies in firsts(packings) if row.shape <= LONG]
     columns = len({(row.angle, round(row.width / shortest(row.shape, row.angle), 6)) for row, _ in some})
-    return snapshots(some, lambda row: rf"$\Lambda$ = {row.shape:g}, {row.angle:g}°", columns, 2.8)
+    return snapshots(some, lambda row: rf"$\Lambda$ = {row.shape:g}, {row.angle:g}°", columns, 2.4, 2.8)
 
 
 def of_superballs(packings: Sequence[Packing]) -> Figure:
     """Draw superballs (B16 Fig. 4.6)."""
     some = firsts(packings)
-    return snapshots(some, lambda row: rf"$\gamma$ = {row.shape:g}", len(some), 3.2)
+    return snapshots(some, lambda row: rf"$\gamma$ = {row.shape:g}", len(some), 2.4, 3.2)
 
 
 def wedge_directions(packings: Sequence[Packing]) -> Figure:

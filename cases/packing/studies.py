@@ -50,7 +50,7 @@ INERTIA_ASPECTS = (1.5, 3.0)
 STEADY_MOTION = 0.5
 """``motion`` of the revised method in these studies. With B16's 0.1 packings need several times the attempts,
 and 200 spheres end at 0.602 in place of 0.610 with 3000."""
-TOGETHER = 8
+SIDE_BY_SIDE = 8
 """Packings that are made side by side; a study that is stopped loses at most these."""
 
 
@@ -227,7 +227,7 @@ def measured_packings(
     scenes = [
         of_shape(plan.body(), size, known["seed"], **plan.options(size, **settings)) for plan, known in each
     ]
-    for index, one in packings(scenes, progress, TOGETHER):
+    for index, one in packings(scenes, progress, SIDE_BY_SIDE):
         yield row(*each[index], one), one
 
 

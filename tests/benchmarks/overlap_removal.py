@@ -83,8 +83,8 @@ class RandomMotions(RemoveOverlaps):
 METHODS = {
     "original": (MechanicalContraction, {"method": "original"}),
     "revised": (MechanicalContraction, {"method": "revised"}),
-    "revised, random rotations": (RandomRemoval, {"directions": "turn"}),
-    "revised, random rotations and displacements": (RandomRemoval, {"directions": "both"}),
+    "random rotations": (RandomRemoval, {"directions": "turn"}),
+    "random motions": (RandomRemoval, {"directions": "both"}),
 }
 
 
@@ -167,7 +167,7 @@ def main(*files):
     """Print attempts until the overlap has fallen to 1e-3, and the part of the attempts in which it rises."""
     tisim.init(threads=1)
     places, turns = triples(TRIPLES, np.random.default_rng(5))
-    figure = empty(12.6, 3.4)
+    figure = empty(12.6, 3.2)
     axes = figure.subplots(1, len(METHODS), sharey=True)
     print(
         "| method | mean after 20 attempts | attempts to 1e-3, median | rising attempts |\n|---|---|---|---|"

@@ -94,6 +94,8 @@ def test_one_row_of_rods_in_the_shortest_wedge():
 def test_scaled_means():
     half = scaled(Mean(4.0, 0.2), Mean(6.0, 0.0))
     assert (half.value, half.half) == (pytest.approx(0.5), pytest.approx(0.05))
+    least = scaled(Mean(2.0, 0.2), Mean(6.0, 0.4))
+    assert (least.value, least.half) == (0.0, pytest.approx(0.05))
 
 
 def test_cylinders_beside_b16():
