@@ -25,13 +25,13 @@ LIGHT = np.array([-0.45, 0.6, 0.66])
 """Direction of the light in coordinates right, up and towards the viewer."""
 SHADE = 0.45
 """Brightness of a facet that faces away from the light."""
-RINGS, SECTORS = 10, 16
+FACET_RINGS, FACET_SECTORS = 10, 16
 """Numbers of facets of a body between its poles, and around its axis."""
 MANY = 1000
 """Number of bodies from which each has a quarter of the facets, so that a picture takes seconds."""
 
 
-def facets(shape: ParticleShape, rings: int = RINGS, sectors: int = SECTORS) -> tuple[np.ndarray, np.ndarray]:
+def facets(shape: ParticleShape, rings: int = FACET_RINGS, sectors: int = FACET_SECTORS) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners (m) and the unit normals of the facets of a shape, shape (f, 4, 3) and (f, 3).
 
     Corners are the farthest points along directions on rings about z, so there are few on flat faces and
@@ -74,7 +74,7 @@ def draw_shapes(
     turns = Rotation.from_quat(state["orientation"], scalar_first=True)
     detail = 1 if len(state["radius"]) < MANY else 2
     for k, shape in enumerate(shapes):
-        quads, outward = facets(shape, RINGS // detail, SECTORS // detail)
+        quads, outward = facets(shape, FACET_RINGS // detail, FACET_SECTORS // detail)
         for i in np.flatnonzero(state["shape"] == k):
             scale = state["radius"][i] / shape.bounding_radius()
             normal = turns[i].apply(outward) @ PROJECTION
