@@ -20,7 +20,8 @@ from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.common.runs import sound
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
-from tisim.plotting.cloud import PROJECTION, common, corners, directions, panel
+from tisim.plotting.cloud import common, corners, directions, panel
+from tisim.plotting.facets import PROJECTION
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
 from tisim.scene.initial_state import Arrays
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 HARD_FAMILIES = (
     "springs", "singular", "gyration", "moments", "ratios", "impacts", "reactions", "granular", "scales",
-    "single_precision", "default_stepper",
+    "single_precision", "packings", "default_stepper",
 )  # fmt: skip
 """The modules that define hard cases, in the order of ``tisim hard``."""
 

@@ -2,11 +2,14 @@
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.packing import curves, snapshots
+from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.snapshots import Packing
 from tisim.cases.packing.studies import PackedRow, Study, measured_packings, plans, table
 from tisim.engine.batches import Progress, progress_of_part
@@ -21,17 +24,18 @@ DRAWN: tuple[Study, ...] = ("aspect ratio", "moment of inertia", "cylinder", "we
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """packing.png: the bodies at the end, coloured by their contacts, and the packing fraction over the
-    attempts."""
-    every = list(trajectory)
-    last = PackedBodies.from_state(every[-1].arrays, trajectory.scene)
+    """packing.png: the bodies at the end, coloured by their contacts, and the number of bodies by contacts,
+    with the packing fraction."""
+    last = PackedBodies.from_state(trajectory[-1].arrays, trajectory.scene)
     figure = empty(10.4, 5.0)
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
     snapshots.draw_by_contacts(left, last)
-    snapshots.contact_scale(figure, [left])
-    fractions = [packing_fraction(PackedBodies.from_state(one.arrays, trajectory.scene)) for one in every]
-    right.plot(trajectory.times, fractions, color=curves.COLOURS[0])
-    right.set(xlabel="attempts", ylabel="packing fraction", ylim=(0, None))
+    numbers = np.bincount(contact_counts(last))
+    contacts = np.arange(len(numbers))
+    right.bar(contacts, numbers, color=snapshots.contact_colours(contacts))
+    right.set(xlabel="contacts of a body, and colour", ylabel="bodies")
+    right.set_title(f"packing fraction {packing_fraction(last):.3f}")
+    right.yaxis.set_major_locator(MaxNLocator(integer=True))
     plain(right)
     letters((left, right))
     return {"packing.png": figure}

@@ -3,9 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from tisim import Result, Scene
+from tisim.accuracy import Quantity
+from tisim.analysis.packings.bond_order import bond_order, contact_bonds
 from tisim.analysis.packings.contact_numbers import contact_numbers
-from tisim.analysis.packings.gaps import near_gaps
+from tisim.analysis.packings.gaps import near_gaps, relative_gaps
 from tisim.analysis.packings.orientational_order import cubatic_order, nematic_order
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
@@ -15,6 +19,12 @@ from tisim.engine.batches import Batches, Progress
 
 CUTOFF = 1e-4
 """Gap (D) up to which bodies are in contact in B16 chapters 3 and 4."""
+
+CONTACT_GAP = 1e-3
+"""Gap (D) up to which bodies count as touching in pictures, and where protocols are compared. Some leave
+overlaps of up to 1e-4 D between touching bodies, others gaps as wide as their last trial moves."""
+SHELL_GAP = 0.4
+"""Gap (D) up to which bodies are neighbours in the bond order, the first minimum of the pair correlation."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,39 @@ def volume_of(result: Result) -> float | None:
     bodies = PackedBodies.from_result(result)
     side = bodies.high - bodies.low
     return around[0].container.volume_in(side, float(bodies.diameters()[0]))
+
+
+def contact_counts(packing: PackedBodies) -> np.ndarray:
+    """Return the number of bodies that each body touches, with a gap of at most CONTACT_GAP, shape (n,)."""
+    gaps = near_gaps(packing, float(CONTACT_GAP * packing.diameters().max()))
+    pairs = gaps.pairs[relative_gaps(packing, gaps) <= CONTACT_GAP]
+    return np.bincount(pairs.ravel(), minlength=len(packing))
+
+
+def mean_contacts(result: Result) -> float:
+    """Return the mean number of bodies that a body touches."""
+    return float(contact_counts(PackedBodies.from_result(result)).mean())
+
+
+def fraction_of(result: Result) -> float:
+    """Return the packing fraction."""
+    return packing_fraction(PackedBodies.from_result(result), volume_of(result))
+
+
+def bond_order_of(result: Result) -> float:
+    """Return the bond order Q6 of all bonds together, of bodies with a gap of at most SHELL_GAP."""
+    bodies = PackedBodies.from_result(result)
+    bonds = contact_bonds(bodies, float(SHELL_GAP * bodies.diameters().max()))
+    return bond_order(len(bodies), bonds, 6).whole
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantities of ``tisim cost``, over random starts."""
+    return (
+        Quantity("packing fraction", fraction_of, random=True),
+        Quantity("contact number", mean_contacts, random=True),
+        Quantity("bond order Q6", bond_order_of, random=True),
+    )
 
 
 def packings(

@@ -15,28 +15,35 @@ from typing import Any
 
 import numpy as np
 
-from tisim import Particles, Scene
+from tisim import Cloud, Particles, Scene
 from tisim.cases.case import Size, size_named
 from tisim.effects import Confinement, Effect, HardRods, HardSuperquadrics
 from tisim.geometry.container import Container
 from tisim.packing import random_bodies
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.shapes.particle_shape import ParticleShape
-from tisim.steppers import MechanicalContraction
+from tisim.steppers import MechanicalContraction, Stepper
 
+TITLE = "Random packings of spheres, rods, ellipsoids and superballs (B16)"
 DIAMETER = 1.0
 """D, m."""
 PUBLISHED_STEP = 0.1 / (np.pi / 6)
 """The first step of the volume in B16, in volumes of a sphere."""
 
+SEARCH_SETTINGS: dict[str, Any] = {
+    "options": {"population": 8, "first": 12}, "ensemble": {"confirm": 8},
+}  # fmt: skip
+"""Settings of searches of every size."""
 SIZES = {
     "small": Size(
         "60 bodies from a packing fraction of 0.2, 200 attempts",
         {"number": 60, "start": 0.2, "step": 2.0, "attempts": 200, "halvings": 3},
+        {"generations": 8, "max_evaluations": 80, **SEARCH_SETTINGS},
     ),
     "default": Size(
         "200 bodies from a packing fraction of 0.1, 2000 attempts",
         {"number": 200, "start": 0.1, "step": 1.0, "attempts": 2000},
+        {"generations": 20, "max_evaluations": 200, **SEARCH_SETTINGS},
     ),
     "paper": Size(
         "500 bodies from a packing fraction of 0.05, 100,000 attempts, as B16",
@@ -82,27 +89,43 @@ def scene(
     seed: int = 0,
     **options: Any,
 ) -> Scene:
-    """Return a scene that packs bodies.
+    """Return a scene that packs bodies by mechanical contraction.
 
-    start : packing fraction of the start. step : first step of the volume, in volumes of a body. attempts,
-        halvings, options : of ``MechanicalContraction``. container : None for a periodic cube. sizes : for a
-        mixture of two sizes, their ratio, and the share of the volume that the larger bodies have.
+    start, container, sizes : as of ``packed_by``. step : first step of the volume, in volumes of a body.
+        attempts, halvings, options : of ``MechanicalContraction``.
+    """
+    unit = 2 * float(shape.half_extents().min())
+    volume_step = step * shape.volume() / unit**3
+    stepper = MechanicalContraction(volume_step=volume_step, attempts=attempts, halvings=halvings, **options)
+    return packed_by(stepper, shape, number, start, container, sizes, seed)
+
+
+def packed_by(
+    stepper: Stepper,
+    shape: ParticleShape,
+    number: int,
+    start: float,
+    container: Container | None = None,
+    sizes: tuple[float, float] | None = None,
+    seed: int = 0,
+) -> Scene:
+    """Return a scene in which a packing stepper packs bodies.
+
+    start : packing fraction of the start. container : None for a periodic cube. sizes : for a mixture of two
+        sizes, their ratio, and the share of the volume that the larger bodies have.
     """
     placed = random_bodies(shape, number, start, container, seed)
     bodies = placed.particles()
     if sizes is not None:
         bodies["radius"] = placed.radius * mixed(number, *sizes, seed)
     walls = () if container is None else (Confinement(container=container),)
-    unit = 2 * float(shape.half_extents().min())
     return Scene(
         name="packing",
         particles=Particles(**bodies),
         effects=(hard(shape), *walls),
         domain=placed.box,
         duration=1e9,
-        stepper=MechanicalContraction(
-            volume_step=step * shape.volume() / unit**3, attempts=attempts, halvings=halvings, **options
-        ),
+        stepper=stepper,
         seed=seed,
     )
 
@@ -118,8 +141,12 @@ def mixed(number: int, ratio: float, share: float, seed: int) -> np.ndarray:
 
 
 def scene_for(size: str, seed: int) -> Scene:
-    """Return a packing of spheres, from the random start of a seed."""
-    return of_shape(rod(1.0), size, seed)
+    """Return a packing of spheres, the start of which follows from the seed of the scene, so that
+    ``tisim cost`` can draw many."""
+    packed = of_shape(rod(1.0), size, seed)
+    number = len(packed.particles.masses(seed))
+    cloud = Cloud(number=number, radius=DIAMETER / 2, density=1.0)
+    return packed.model_copy(update={"particles": cloud})
 
 
 def of_shape(shape: ParticleShape, size: str, seed: int, **options: Any) -> Scene:

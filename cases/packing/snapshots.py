@@ -9,9 +9,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from tisim.analysis.packings.gaps import near_gaps, relative_gaps
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.wall_alignment import direction_histogram
+from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.studies import PackedRow, shortest
 from tisim.plotting.bodies import draw_bodies
 from tisim.plotting.packings import directions
@@ -19,8 +19,6 @@ from tisim.plotting.style import empty
 
 MOST_CONTACTS = 12
 """Number of contacts from which colours do not change."""
-TOUCHING_GAP = 1e-3
-"""Gap (D) up to which bodies count as touching in a picture, more than the tolerance of a packing."""
 SEGMENT = 8.0
 """Length (D) of the drawn part of a cylinder."""
 DIRECTION_BINS = (8, 20)
@@ -31,16 +29,14 @@ Packing = tuple[PackedRow, PackedBodies]
 """A line of a study, and its bodies."""
 
 
-def contact_counts(packing: PackedBodies) -> np.ndarray:
-    """Return the number of bodies that each body touches, shape (n,)."""
-    gaps = near_gaps(packing, float(TOUCHING_GAP * packing.diameters().max()))
-    pairs = gaps.pairs[relative_gaps(packing, gaps) <= TOUCHING_GAP]
-    return np.bincount(pairs.ravel(), minlength=len(packing))
+def contact_colours(contacts: np.ndarray) -> np.ndarray:
+    """Return the colours (red, green, blue) of numbers of contacts, shape (n, 3)."""
+    return np.asarray(colormaps["viridis"](np.clip(contacts / MOST_CONTACTS, 0, 1))[:, :3])
 
 
 def draw_by_contacts(axis: Axes, packing: PackedBodies, kept: np.ndarray | None = None) -> None:
     """Draw a packing, or some of its bodies, each coloured by its number of contacts."""
-    colours = colormaps["viridis"](np.clip(contact_counts(packing) / MOST_CONTACTS, 0, 1))[:, :3]
+    colours = contact_colours(contact_counts(packing))
     some = np.ones(len(packing), bool) if kept is None else kept
     draw_bodies(axis, packing.where(some), colours[some])
 

@@ -19,6 +19,7 @@ from tisim.accuracy.quantity import reference_runs, truth_by_reference
 from tisim.accuracy.report import notes
 from tisim.accuracy.scene_changes import exchanged, expression, finest, options, parts, softened, softening
 from tisim.accuracy.sweep import methods, rivals
+from tisim.cases.packing import scene as packing
 from tisim.cli.scene_arguments import assignments
 from tisim.components import serialization
 from tisim.components.accuracy_parameter import AccuracyParameter
@@ -54,7 +55,15 @@ from tisim.effects import (
 )
 from tisim.geometry import Plane
 from tisim.sources import MagneticField
-from tisim.steppers import Brownian, DriftLimit, FixedStep, Stepper, Verlet
+from tisim.steppers import (
+    Brownian,
+    DriftLimit,
+    FixedStep,
+    MechanicalContraction,
+    MonteCarloGrowth,
+    Stepper,
+    Verlet,
+)
 
 LEVELS = (2.0, 1.0, 0.0)
 
@@ -369,6 +378,42 @@ def test_an_accuracy_parameter_is_varied_by_decades_of_error():
     assert both.turned(Pace(dt=0.123456, error=1e-3), 0).dt == 0.123456
     with pytest.raises(InputError, match=r"pace.dt must be at least 1e-30; received 0.0"):
         AccuracyParameter(dt=0.01).turned(Pace(dt=1.0), -4)
+
+
+def test_whole_numbers_remain_whole():
+    """Attempts decrease with the error, by a factor of 100 in a decade."""
+    tries = AccuracyParameter(attempts=-0.5)
+    contraction = MechanicalContraction(attempts=2000)
+    assert [repr(tries.turned(contraction, k).attempts) for k in (1, 0, -1)] == ["20", "2000", "200000"]
+    assert tries.turned(MechanicalContraction(attempts=60), 1).attempts == 1
+    with pytest.raises(InputError, match=r"mechanical_contraction.attempts must be at least 1; received 0"):
+        tries.turned(contraction, 2)
+    packed = packing.scene_for("small", 0).replace({"stepper.attempts": 1234})
+    named = [s.description for s in methods_of(packed)["MechanicalContraction(volume_step=1.05, halvings=3, "
+             "attempts=1234): attempts"].settings]  # fmt: skip
+    assert named == ["attempts=12", "attempts=1234"]
+
+
+def test_packing_steppers_are_compared_with_each_other():
+    """The energy minimisation alone converges, to the jamming density of a start, and is the reference."""
+    tried = methods_of(packing.scene_for("small", 0))
+    own = "MechanicalContraction(volume_step=1.05, halvings=3, attempts=200)"
+    other = own.replace("(", "(method='original', ", 1)
+    assert list(tried) == [
+        f"{own}: attempts", f"{own}: volume_step", f"{own}: tolerance", f"{own}: motion",
+        f"{other}: attempts", f"{other}: volume_step", f"{other}: tolerance",
+        "EnergyMinimisation: precision, tolerance",
+        "MonteCarloGrowth(precision=0.001): precision", "MonteCarloGrowth(precision=0.001): rate",
+    ]  # fmt: skip
+    references = reference_runs(list(tried.values()), 0.0)
+    assert [one.name for one in references] == ["EnergyMinimisation"] * 2
+    assert [one.scene.stepper.tolerance for one in references] == [1e-6, 1e-5]
+    ellipsoids = methods_of(packing.of_shape(packing.spheroid(1.5), "small", 0))
+    assert not any("original" in name for name in ellipsoids)
+    assert "EnergyMinimisation: precision, tolerance" in ellipsoids
+    growing = packing.scene_for("small", 0).model_copy(update={"stepper": MonteCarloGrowth()})
+    contracted = [name for name in methods_of(growing) if name.startswith("Mechanical")]
+    assert contracted[0] == "MechanicalContraction(method='original', attempts=2000): attempts"
 
 
 WRONG = [

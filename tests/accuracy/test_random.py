@@ -18,7 +18,10 @@ from tisim.accuracy.quantity import (
     usual,
 )
 from tisim.accuracy.sweep import methods
+from tisim.cases.case import every
+from tisim.cases.packing import scene as packing
 from tisim.effects import Impact
+from tisim.geometry import SphericalContainer
 
 ENSEMBLES, STARTS = 60, 8
 
@@ -86,11 +89,36 @@ def test_a_random_reference_is_no_better_than_its_starts(drifts):
     assert error < TRUSTED * off
 
 
+@pytest.mark.slow
+def test_packings_are_compared_with_their_jamming_density():
+    """Mechanical contraction of few attempts ends before spheres jam, at a third of the density below."""
+    scene = packing.scene_for("small", 0).replace({"stepper.attempts": 20})
+    cost_study = Study(
+        scene, every()["packing"].quantities(scene), precisions=("f64",), repeats=1, starts=(8,), coarser=0
+    )
+    run(cost_study)
+    assert cost_study.complete
+    (own,) = cost_study.line(cost_study.rows[1].method)
+    (jammed,) = cost_study.line("EnergyMinimisation: precision, tolerance")
+    assert own.errors[0][0] > 0.4
+    assert jammed.errors[0][0] < 0.05
+    assert cost_study.cheapest(0.1).method.startswith(("EnergyMinimisation", "MonteCarloGrowth"))
+    assert [truth.error < 0.05 for truth in cost_study.truths[:2]] == [True, True]
+
+
 def test_default_quantities():
     impacts = (Impact(hardness=1e5),)
     assert [q.name for q in usual(drift())] == ["velocity"]
     assert usual(drift().model_copy(update={"effects": impacts}))[0].random
     free = drift().model_copy(update={"domain": type(drift()).model_fields["domain"].default})
     assert usual(free)[0].value is displacement
+    packed = packing.scene_for("small", 0)
+    (fraction,) = usual(packed)
+    assert (fraction.name, fraction.random) == ("packing fraction", True)
+    # Their places and orientations are given.
+    assert not usual(packing.of_shape(packing.rod(1.5), "small", 0))[0].random
+    walled = packing.of_shape(packing.rod(1.5), "small", 0, container=SphericalContainer(), start=0.05)
+    with pytest.raises(InputError, match="quantities must be given, as walls bound the packing"):
+        usual(walled)
     with pytest.raises(InputError, match="quantities must be given, as impacts"):
         usual(head_on(1.0, impacts, domain=Box(low=(-1.0,) * 3, high=(1.0,) * 3)))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tisim.plotting.cloud import PROJECTION, panel
+from tisim.plotting.cloud import panel
+from tisim.plotting.facets import PROJECTION
 
 
 def image(position):

@@ -6,8 +6,8 @@ import pytest
 from tests.scenes import scene
 from tisim.analysis import bounding_ellipsoid, fit_bingham, fit_biviscous, fit_herschel_bulkley, labels
 from tisim.effects import Tether
-from tisim.plotting.cloud import PROJECTION
 from tisim.plotting.clusters import clusters
+from tisim.plotting.facets import PROJECTION
 from tisim.plotting.measures import chain_lengths, flow_curve, neighbours, profiles
 
 RATE = np.geomspace(1, 1000, 12)

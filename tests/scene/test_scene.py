@@ -283,3 +283,9 @@ def test_a_scene_and_a_material_are_printed_in_a_line():
         == ("Scene('a cloud': 7 particles, Impact, Friction, Heating, Cooling, Verlet, 0.5 s)")
     )
     assert repr(Material(young=1e7, poisson=0.25)) == "Material(young=10000000.0, poisson=0.25)"
+
+
+@pytest.mark.parametrize("name", ["stepper", "domain"])
+def test_a_table_in_place_of_a_part_is_refused_by_name(name):
+    with pytest.raises(InputError, match=rf"scene.{name} must be a {name}, not its table"):
+        cloud(**{name: {"kind": "verlet"}})

@@ -17,7 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tisim.accuracy.scene_changes import finest
-from tisim.accuracy.sweep import USUAL_NUMBERS, SettingSweep
+from tisim.accuracy.sweep import USUAL_NUMBERS, SettingSweep, with_control
+from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.effects.base import PairEvent
 from tisim.engine.result import Result
 from tisim.errors import RunError, Words, must
@@ -122,8 +124,13 @@ def mean_square(result: Result) -> float:
     return float((displacement(result) ** 2).sum(axis=1).mean())
 
 
+def packed_fraction(result: Result) -> float:
+    """Return the packing fraction of a packing in a periodic box."""
+    return packing_fraction(PackedBodies.from_result(result))
+
+
 def usual(scene: Scene) -> tuple[Quantity, ...]:
-    """Return the default quantity of a scene: the displacement of its particles.
+    """Return the default quantity of a scene: the displacement of its particles, or a packing fraction.
 
     If the stepper is random, the quantity is the mean square displacement. In a periodic box it is the
     velocity, in a sheared box the velocity relative to the flow, because positions jump at the periodic
@@ -131,6 +138,12 @@ def usual(scene: Scene) -> tuple[Quantity, ...]:
     then it is the mean kinetic energy over random starts. InputError for random paths in a periodic box, and
     if impacts or operators start from a state without randomness.
     """
+    if scene.stepper.packs:
+        rule = "given, as walls bound the packing"
+        must(all(scene.domain.joined()), "quantities", rule, Words("none"))
+        one, other = (scene.start(scene.seed + k) for k in (0, 1))
+        differ = any(not np.array_equal(one[name], other[name]) for name in one)
+        return (Quantity("packing fraction", packed_fraction, random=differ),)
     if scene.stepper.random:
         must(
             not any(scene.domain.joined()),
@@ -188,7 +201,7 @@ class ReferenceRun:
     def name(self) -> str:
         """The stepper and its step control, as text."""
         stepper = self.method.base.stepper
-        return f"{type(stepper).__name__}, {type(stepper.control).__name__}"
+        return with_control(type(stepper).__name__, stepper)
 
 
 def reference_runs(methods: Sequence[SettingSweep], level: float) -> list[ReferenceRun]:

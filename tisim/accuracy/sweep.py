@@ -19,7 +19,8 @@ from tisim.accuracy.scene_changes import (
     within,
 )
 from tisim.components import serialization
-from tisim.components.accuracy_parameter import AccuracyParameter
+from tisim.components.accuracy_parameter import AccuracyParameter, three_digits
+from tisim.components.component import Component
 from tisim.effects.base import Effect
 from tisim.errors import InputError
 from tisim.scene.scene import Scene
@@ -116,10 +117,15 @@ def methods(
     for stepper in _steppers(scene, dt):
         other = exchanged(scene, "stepper", stepper)
         for path, part in within("stepper", stepper):
-            sweeps += [
-                _turning(other, path, k, levels, starts) for k in part.accuracy_parameters if k.converges
-            ]
+            sweeps += [_turning(other, path, k, levels, starts) for k in _tried(part)]
     return [method for method in sweeps if method.settings]
+
+
+def _tried(part: Component) -> list[AccuracyParameter]:
+    """Return the accuracy parameters of a part of another stepper that are varied: the convergent ones, or
+    all if none of them converges."""
+    convergent = [one for one in part.accuracy_parameters if one.converges]
+    return convergent or list(part.accuracy_parameters)
 
 
 def ensembles(scene: Scene, sizes: Sequence[int]) -> SettingSweep:
@@ -174,7 +180,8 @@ def _turning(
     starts: int,
     numbers: tuple[str, str] = USUAL_NUMBERS,
 ) -> SettingSweep:
-    settings, weights = [], []
+    settings: list[Setting] = []
+    weights: list[float] = []
     for decades in levels:
         try:
             changed = turned(scene, path, accuracy_parameter, decades)
@@ -183,12 +190,19 @@ def _turning(
         if not _stands(changed):
             continue  # The setting does not suit the domain, for example waves that do not fit into it.
         part = dict(parts(changed))[path]
-        description = ", ".join(f"{name}={getattr(part, name):.3g}" for name in accuracy_parameter.orders)
+        description = ", ".join(f"{name}={_short(getattr(part, name))}" for name in accuracy_parameter.orders)
+        if any(description == one.description for one in settings):
+            continue  # A whole number may be rounded to the same value at two levels.
         settings.append(Setting(changed, description, numbers[0], starts, numbers[1]))
         weights.append(10.0 ** (-decades / scene.stepper.order) if path.startswith("stepper") else 1.0)
     name = f"{_title(scene, path)}: {', '.join(accuracy_parameter.orders)}"
     name += "".join(f", {kind}" for kind, plain in zip(numbers, USUAL_NUMBERS, strict=True) if kind != plain)
     return SettingSweep(name, tuple(settings), tuple(weights), scene, path, accuracy_parameter)
+
+
+def _short(value: float) -> str:
+    """Return a whole number in full and another one to three digits."""
+    return str(value) if isinstance(value, int) else f"{value:.3g}"
 
 
 def _laws(
@@ -230,15 +244,21 @@ def _softer(scene: Scene, properties: Mapping[str, float], starts: int) -> Setti
     return SettingSweep(f"softer, in longer steps: {', '.join(properties)}", tuple(settings), weights, scene)
 
 
+def with_control(name: str, stepper: Stepper) -> str:
+    """Return a name of a stepper followed by the kind of its step control, if that trades accuracy for
+    time."""
+    control = stepper.control
+    return f"{name}, {type(control).__name__}" if control.accuracy_parameters else name
+
+
 def _title(scene: Scene, path: str) -> str:
     if not path.startswith("stepper"):
         return path.removeprefix("effects.")
     # Required settings of every such stepper, such as the fluid, do not distinguish methods.
     stepper, fields = scene.stepper, type(scene.stepper).model_fields
     chosen = [
-        f"{k}={v!r}"
+        f"{k}={three_digits(v) if isinstance(v, float) else v!r}"
         for k, v in non_default_settings(stepper).items()
         if k != "control" and not fields[k].is_required()
     ]
-    name = type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else "")
-    return f"{name}, {type(stepper.control).__name__}"
+    return with_control(type(stepper).__name__ + (f"({', '.join(chosen)})" if chosen else ""), stepper)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -156,7 +157,8 @@ def _summary(result: Result, setup_s: float, paths: Sequence[Path]) -> Table:
     counts = len(result.start["mass"]), len(result.state["mass"])
     table = plain_table()
     table.add_row("status", "ok" if result.status.ok else "failed")
-    table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s")
+    early = result.status.ok and not math.isclose(result.time, result.scene.duration)
+    table.add_row("time", f"{result.time:g} s of {result.scene.duration:g} s" + ", ended by itself" * early)
     table.add_row("particles", f"{counts[0]} at the start, {counts[1]} at the end")
     for name, count in result.work.items():
         table.add_row(name.replace("_", " "), str(count))

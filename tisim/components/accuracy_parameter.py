@@ -20,10 +20,11 @@ class AccuracyParameter:
 
     ``AccuracyParameter(error=1)``: the error is proportional to the setting. ``AccuracyParameter(dt=2)``: the
     error is proportional to dt^2. ``AccuracyParameter(longest=2, tolerance=1)``: two settings that are varied
-    together. A part lists its own in ``accuracy_parameters``, and ``tisim cost`` varies them.
+    together. ``AccuracyParameter(attempts=-1)``: the error is inversely proportional to a number of attempts.
+    A part lists its own in ``accuracy_parameters``, and ``tisim cost`` varies them.
 
     converges : whether the error of the part vanishes with the parameter; False if another setting, which is
-        not varied, also limits the error.
+        not varied, also limits the error. Its order then only spaces the values that are tried.
     """
 
     def __init__(self, *, converges: bool = True, **orders: float) -> None:
@@ -32,11 +33,13 @@ class AccuracyParameter:
     def turned(self, part: Part, decades: float) -> Part:
         """Return the part with settings for an error larger by a number of decades; the part itself for 0.
 
-        Settings are rounded to three digits. Raise InputError if the part cannot have them.
+        Settings are rounded to three digits, and whole numbers remain whole. Raise InputError if the part
+        cannot have them.
         """
         if decades == 0:
             return part
         values = {name: getattr(part, name) for name in type(part).model_fields}
         for name, order in self.orders.items():
-            values[name] = three_digits(values[name] * 10 ** (decades / order))
+            value = three_digits(values[name] * 10 ** (decades / order))
+            values[name] = round(value) if type(part).model_fields[name].annotation is int else value
         return type(part)(**values)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import time
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -64,9 +65,9 @@ class Frames:
     Reading raises InputError if the file is damaged.
     """
 
-    def __init__(self, file: _RetryingFile, world: str | None) -> None:
-        """world : name of the group of the world; None in a result.h5."""
-        self._file, self._world = file, world
+    def __init__(self, file: _RetryingFile, world: str | None, path: Path) -> None:
+        """world : name of the group of the world; None in a result.h5. path : of the file."""
+        self._file, self._world, self._path = file, world, path
 
     @cached_property
     def scene(self) -> Scene:
@@ -114,11 +115,25 @@ class Frames:
 
     @property
     def missing(self) -> str:
-        """Return a sentence about the missing frames of an unfinished run; it is empty for a finished one."""
+        """Return a sentence about the missing frames of an unfinished run; it is empty for a finished one.
+
+        A run that ends by itself before its duration, as a packing does, has a result of that time.
+        """
         reached, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
-        if reached >= end * (1 - TIME_ROUNDING):
+        if reached >= end * (1 - TIME_ROUNDING) or reached == self._ended_at():
             return ""
         return f"the run has come to t = {reached:.6g} s of {end:.6g} s; what follows is missing"
+
+    def _ended_at(self) -> float:
+        """Return the time (s) of a result.h5 whose run has ended, or of the one beside a trajectory; NaN if
+        the run has failed or there is none."""
+        if self._world is None:
+            return self._file.read(_end_time)
+        beside = self._path.with_name("result.h5")
+        if not regular_file.exists(beside):
+            return math.nan
+        with _open_file(beside) as result:
+            return result.read(_end_time)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -158,7 +173,7 @@ def frames(path: str | Path, world: int = 0) -> Iterator[Frames]:
     with _open_file(Path(path)) as file:
         names = file.read(_world_groups)
         must(0 <= world < len(names), "world", f"0 to {len(names) - 1}", world)
-        yield Frames(file, names[world])
+        yield Frames(file, names[world], Path(path))
 
 
 def world_count(path: str | Path) -> int:
@@ -328,6 +343,11 @@ def _check_creator(file: h5py.File, path: Path, rule: str) -> None:
     creator = file.get("h5md/creator")
     must(creator is not None and creator.attrs.get("name") == b"tisim", "file", rule, str(path))
     must(h5md.CHECKSUMS in file, "file", f"{rule}, with checksums", str(path))
+
+
+def _end_time(file: h5py.File) -> float:
+    """Return the time (s) at the end of a result.h5; NaN if the run has failed."""
+    return float(file.attrs["time"]) if file.attrs["ok"] else math.nan
 
 
 def _world_groups(file: h5py.File) -> list[str | None]:

@@ -15,17 +15,17 @@ from matplotlib.figure import Figure
 
 from tisim.effects.external.gravity import Gravity
 from tisim.engine.result import Result
+from tisim.plotting.facets import LIGHT, PROJECTION, draw_shapes, shapes_of
 from tisim.plotting.style import empty, letters, si
 from tisim.plotting.walls import outlines
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
+from tisim.shapes.particle_shape import ParticleShape
 
 PIXELS = 1400
 """Width of a panel in pixels, twice the width that is shown, to smooth edges."""
 SMALLEST = 4.0
 """Smallest radius of a grain in these pixels, so that it is visible."""
-AZIMUTH, ELEVATION = np.radians(-62.0), np.radians(18.0)
-"""Direction of the viewer: azimuth from x in the xy plane, and elevation, rad."""
 GRAIN_COLOUR = (0.36, 0.55, 0.73)
 """Colour of grains without a temperature: red, green and blue, 0..1."""
 WALL_COLOUR = "0.55"
@@ -34,15 +34,6 @@ GRAVITY_COLOUR = "#b3413e"
 """Colour of the arrow of gravity."""
 # The black end is left out, because cold grains would show neither shading nor edges.
 HEAT = ListedColormap(colormaps["inferno"](np.linspace(0.17, 0.97, 256)))
-
-_TOWARDS = np.array([
-    np.cos(ELEVATION) * np.cos(AZIMUTH), np.cos(ELEVATION) * np.sin(AZIMUTH), np.sin(ELEVATION)
-])  # fmt: skip
-_RIGHT = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
-_UP = np.cross(_TOWARDS, _RIGHT)
-PROJECTION = np.stack([_RIGHT, _UP, _TOWARDS], axis=1)
-"""Matrix that projects a point to coordinates right, up and towards the viewer."""
-_LIGHT = np.array([-0.45, 0.6, 0.66])
 
 
 def cloud(result: Result) -> Figure:
@@ -67,20 +58,24 @@ def start_and_end(
     walls = [walls_at(scene, states, time) for time in times]
     square = common(states, np.vstack([box, *itertools.chain(*walls)]))
     for axis, state, heading, time, lines in zip(axes, states, ("start", last), times, walls, strict=True):
-        panel(axis, state, square, box, heat_colours(state, norm), lines)
+        panel(axis, state, square, box, heat_colours(state, norm), lines, shapes_of(scene))
         directions(axis, square, gravity(scene))
-        axis.set_title(f"{heading}, {caption(state, time)}")
+        axis.set_title(f"{heading}, {caption(state, time, scene)}")
     letters(axes)
     if norm is not None:
         scale(figure, axes, norm)
     return figure
 
 
-def caption(state: Arrays, time: float) -> str:
-    """Return a caption with the time (s), and the number and mean radius of the grains."""
+def caption(state: Arrays, time: float, scene: Scene) -> str:
+    """Return a caption with the time (s), and the number and mean radius of the grains; of bodies that are
+    not spheres, it is the radius of the bounding sphere."""
     n = len(state["radius"])
-    size = f", mean radius {si(float(state['radius'].mean()), 'm')}" if n else ""
-    return f"t = {si(time, 's')}: {n} grain{'s' * (n != 1)}{size}"
+    one, several, name = "grain", "grains", "radius"
+    if shapes_of(scene):
+        one, several, name = "body", "bodies", "bounding radius"
+    size = f", mean {name} {si(float(state['radius'].mean()), 'm')}" if n else ""
+    return f"t = {si(time, 's')}: {n} {one if n == 1 else several}{size}"
 
 
 def scale(figure: Figure, beside: Any, norm: Normalize, place: Axes | None = None) -> None:
@@ -132,7 +127,7 @@ def walls_at(scene: Scene, states: Sequence[Arrays], time: float) -> list[np.nda
     if not len(size):
         return []
     low, high = (place - size[:, None]).min(axis=0), (place + size[:, None]).max(axis=0)
-    return [project(line) for line in outlines(scene, time, low, high, _TOWARDS)]
+    return [project(line) for line in outlines(scene, time, low, high, PROJECTION[:, 2])]
 
 
 def common(states: Sequence[Arrays], box: np.ndarray) -> tuple[float, float, float]:
@@ -157,16 +152,22 @@ def view(state: Arrays, box: np.ndarray) -> tuple[float, float, float]:
 def panel(
     axis: Axes, state: Arrays, square: tuple[float, float, float], box: np.ndarray,
     colour: np.ndarray | None = None, walls: Sequence[np.ndarray] = (),
+    shapes: Sequence[ParticleShape] = (),
 ) -> None:  # fmt: skip
     """Draw a state in a square from ``view``, with a box from ``corners`` and lines from ``walls_at``.
 
-    colour : red, green and blue of each grain, shape (n, 3); the same for all by default.
+    colour : red, green and blue of each grain, shape (n, 3); the same for all by default. shapes : of the
+    particles; empty for spheres.
     """
     left, bottom, side = square
     if colour is None:
         colour = np.tile(GRAIN_COLOUR, (len(state["radius"]), 1))
-    image = _draw(project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
-    axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
+    if shapes:
+        draw_shapes(axis, state, shapes, colour)
+        axis.set_aspect("equal")
+    else:
+        image = _draw(project(state["position"]) - (left, bottom, 0.0), state["radius"], colour, side)
+        axis.imshow(image, extent=(left, left + side, bottom, bottom + side), origin="lower", zorder=2)
     if len(box):
         _edges(axis, box)
     for line in walls:
@@ -219,7 +220,7 @@ def _draw(projected: np.ndarray, radius: np.ndarray, colour: np.ndarray, side: f
         w = np.sqrt(np.maximum(w2, 0.0))
         front = (w2 > 0) & (z + r * w > depth[i0:i1, j0:j1])
         depth[i0:i1, j0:j1][front] = (z + r * w)[front]
-        lit = np.clip(u * _LIGHT[0] + v * _LIGHT[1] + w * _LIGHT[2], 0.0, 1.0)[..., None]
+        lit = np.clip(u * LIGHT[0] + v * LIGHT[1] + w * LIGHT[2], 0.0, 1.0)[..., None]
         # Dark grains keep a visible outline; the highlight distinguishes a sphere from a disc.
         shade = np.clip((0.42 + 0.58 * lit) * (0.1 + 0.9 * rgb) + 0.35 * lit**24, 0.0, 1.0)
         image[i0:i1, j0:j1, :3][front] = shade[front]

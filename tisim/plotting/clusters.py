@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from tisim.analysis.bounding_ellipsoid import Ellipsoid
-from tisim.plotting.cloud import PROJECTION, corners, directions, panel, project, view
+from tisim.plotting.cloud import corners, directions, panel, project, view
+from tisim.plotting.facets import PROJECTION
 from tisim.plotting.style import empty, legend_above
 from tisim.plotting.walls import AROUND
 from tisim.scene.initial_state import Arrays

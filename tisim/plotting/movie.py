@@ -15,6 +15,7 @@ from tisim.errors import InputError, RunError, Words, must
 from tisim.files.atomic import replacing
 from tisim.io.reader import Frames
 from tisim.plotting import cloud
+from tisim.plotting.facets import PROJECTION, shapes_of
 from tisim.scene.initial_state import Arrays
 
 SIDE = 5.0
@@ -36,6 +37,7 @@ def movie(
     figure = Figure(figsize=(SIDE + 0.9 * (coloured is not None), SIDE), facecolor="white")
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
+    shapes = shapes_of(frames.scene)
     box = cloud.corners(*frames.scene.domain.bounds())
     square = cloud.view(ranges, np.vstack([box, *walls_of_all(frames, ranges)]))
     if coloured is not None:
@@ -50,9 +52,9 @@ def movie(
                 axis.clear()
                 walls = cloud.walls_at(frames.scene, [ranges], frame.time)
                 colours = cloud.heat_colours(frame.arrays, coloured)
-                cloud.panel(axis, frame.arrays, square, box, colours, walls)
+                cloud.panel(axis, frame.arrays, square, box, colours, walls, shapes)
                 cloud.directions(axis, square, cloud.gravity(frames.scene))
-                figure.suptitle(cloud.caption(frame.arrays, frame.time), fontsize=10, y=0.985)
+                figure.suptitle(cloud.caption(frame.arrays, frame.time, frames.scene), fontsize=10, y=0.985)
                 writer.grab_frame()
                 progress((k + 1) / len(frames))
     except CalledProcessError as error:
@@ -91,7 +93,7 @@ def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:
         if not len(arrays["radius"]):
             continue
         for extreme in (np.argmin, np.argmax):
-            for k in {int(i) for i in extreme(arrays["position"] @ cloud.PROJECTION, axis=0)}:
+            for k in {int(i) for i in extreme(arrays["position"] @ PROJECTION, axis=0)}:
                 position.append(arrays["position"][k])
                 radius.append(arrays["radius"].max())
         if "temperature" in arrays:

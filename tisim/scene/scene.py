@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from tisim.components import serialization
 from tisim.components.component import Component, Text, option, parameter
@@ -75,6 +75,13 @@ class Scene(Component):
         gt=0,
     )
     seed: int = option("seed of all random numbers of the scene", 0, ge=0, lt=2**63)
+
+    @field_validator("stepper", "domain", mode="before")
+    @classmethod
+    def _made(cls, value: Any, info: ValidationInfo) -> Any:
+        rule = f"a {info.field_name}, not its table (Scene.from_dict and replace read tables)"
+        must(not isinstance(value, Mapping), f"scene.{info.field_name}", rule, value)
+        return value
 
     @field_validator("effects", mode="before")
     @classmethod

@@ -8,7 +8,7 @@ from tisim.cases.blast.figures import SEQUENCE_FRAMES, BlastHistory, beside, pic
 from tisim.cases.blast.rest_figure import W_TAU, growth, rest_figure, rest_table, rested
 from tisim.cases.blast.scene import scene
 from tisim.io.reader import frames
-from tisim.plotting.cloud import PROJECTION
+from tisim.plotting.facets import PROJECTION
 
 
 @pytest.mark.slow

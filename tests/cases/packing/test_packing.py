@@ -7,8 +7,10 @@ from tisim import Recording, run
 from tisim.cases.packing.figures import pictures
 from tisim.cases.packing.measures import measured
 from tisim.cases.packing.scene import mixed, of_shape, rod
+from tisim.io import run_folder
 from tisim.io.reader import frames
-from tisim.plotting.bodies import facets
+from tisim.plotting.facets import facets
+from tisim.plotting.time_series import clouds
 from tisim.shapes import EllipsoidShape, SuperquadricShape
 
 
@@ -29,16 +31,27 @@ def test_a_mixture_is_denser_than_equal_spheres():
     assert dense > equal + 0.02
 
 
-def test_the_picture_of_a_run(tmp_path):
+def test_the_pictures_of_a_run(tmp_path):
+    """Bodies are drawn by their shapes, and bars count all of them; an ended packing lacks no frames."""
     scene = of_shape(rod(2.0), "small", 0, number=40, attempts=20, step=4.0)
-    run(scene, record=Recording(tmp_path / "packing.h5", frames=3))
-    with frames(tmp_path / "packing.h5") as trajectory:
-        figure = pictures(trajectory)["packing.png"]
-    left, right, _scale = figure.axes
+    record = Recording(tmp_path / "trajectory.h5", frames=3)
+    result = run(scene, record=record)
+    with frames(record.path) as trajectory:
+        assert trajectory.missing
+    run_folder.write_result(result, tmp_path / "result.h5")
+    for name in ("trajectory.h5", "result.h5"):
+        with frames(tmp_path / name) as trajectory:
+            assert not trajectory.missing
+            figure = pictures(trajectory)["packing.png"]
+            start, _end = clouds(trajectory).axes
+    left, right = figure.axes
     assert left.collections
-    fractions = right.lines[0].get_ydata()
-    assert fractions[0] == pytest.approx(0.2)
-    assert fractions[-1] > fractions[0]
+    assert sum(bar.get_height() for bar in right.patches) == 40
+    assert right.get_title(loc="left") == f"(b) packing fraction {measured(result).fraction:.3f}"
+    (drawn,) = start.collections
+    assert len(drawn.get_paths()) > 40 * 20
+    assert not start.images
+    assert start.get_title(loc="left").startswith("(a) start, t = 0 s: 40 bodies, mean bounding radius 1 m")
 
 
 @pytest.mark.parametrize(

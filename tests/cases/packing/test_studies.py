@@ -7,8 +7,9 @@ from tisim.analysis import Mean
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.cases.packing.comparisons import compared, scaled, shortest_fraction
 from tisim.cases.packing.curves import of_cylinders, of_rods, of_superballs, of_wedges
+from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.scene import rod
-from tisim.cases.packing.snapshots import contact_counts, in_cylinders, in_wedges, wedge_directions
+from tisim.cases.packing.snapshots import in_cylinders, in_wedges, wedge_directions
 from tisim.cases.packing.studies import (
     STUDIES,
     PackedPlan,

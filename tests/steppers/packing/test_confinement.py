@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.compare import same_arrays
+from tests.steppers.packing.bits import resumed, same_bits
 from tests.steppers.packing.test_mechanical_contraction import (
     CUBOID,
     ELLIPSOID,
@@ -17,7 +17,6 @@ from tests.steppers.packing.test_mechanical_contraction import (
 )
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Confinement
-from tisim.engine.checkpoint import restore, save
 from tisim.geometry import BoxContainer, CylindricalContainer, SphericalContainer, WedgeContainer
 from tisim.packing import random_bodies, wall_gaps
 from tisim.shapes import SpherocylinderShape
@@ -274,6 +273,9 @@ def test_a_container_grows_with_its_bodies(container):
             centre = 0.0 if container is WEDGE else side / 2
             moved = centre + np.where(scaled, growth, 1.0) * (before["position"] - centre)
             np.testing.assert_allclose(after["position"], moved, rtol=0, atol=1e-12)
+            (measures,) = simulation.measures([0])
+            solid = 48 * SPHERE.volume() * (2 * after["radius"][0]) ** 3
+            assert measures["packing_fraction"] == pytest.approx(solid / volumes[1], rel=1e-9)
             checked += 1
     assert checked > 3
     simulation.close()
@@ -344,41 +346,14 @@ def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
         )
         for k in range(3)
     ]  # fmt: skip
-    usual = run(scenes)
-    (alone,) = run([scenes[1]])
-    simulation = Simulation(scenes[0], 3, capacity=82)
-    simulation.load(scenes)
-    simulation.run(steps=37)
-    save(simulation, tmp_path / "c.h5")
-    simulation.run(steps=3)
-    simulation.load(scenes)
-    restore(simulation, tmp_path / "c.h5")
-    simulation.run()
+    usual = same_bits(scenes, tmp_path, 37)
     assert usual[1].work["contractions"] > 0
-    for other in (alone, simulation.results()[1]):
-        assert (other.time, other.work) == (usual[1].time, usual[1].work)
-        same_arrays(other.state, usual[1].state)
-    simulation.close()
 
 
 @pytest.mark.slow
 def test_a_resumed_packing_returns_to_its_last_configuration(tmp_path):
     made = scene(CYLINDER, SPHERE, attempts=60, volume_step=8.0, method="original", halvings=1)
-    simulation = Simulation(made, 1)
-    simulation.load([made])
-    while int(simulation.s.read("attempted")[0]) < 50 or not int(simulation.s.read("contractions")[0]):
-        simulation.run(steps=1)
-    save(simulation, tmp_path / "c.h5")
-    simulation.run()
-    (expected,) = simulation.results()
-    simulation.load([made])
-    restore(simulation, tmp_path / "c.h5")
-    simulation.run()
-    (resumed,) = simulation.results()
-    assert resumed.time == expected.time
-    same_arrays(resumed.state, expected.state)
-    assert -gaps(resumed) <= TOLERANCE * (1 + 1e-9)
-    simulation.close()
+    assert -gaps(resumed(made, tmp_path)) <= TOLERANCE * (1 + 1e-9)
 
 
 def test_what_does_not_fit_is_refused():

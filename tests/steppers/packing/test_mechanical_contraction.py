@@ -5,13 +5,12 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-from tests.compare import same_arrays
 from tests.shapes.pairs import Bodies, superquadric_contacts
+from tests.steppers.packing.bits import resumed, same_bits
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Gravity
 from tisim.effects.contact.hard_rods import HardRods
 from tisim.effects.contact.hard_superquadrics import HardSuperquadrics
-from tisim.engine.checkpoint import restore, save
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.steppers import FixedStep, Verlet
 from tisim.steppers.packing.mechanical_contraction import MechanicalContraction
@@ -184,6 +183,7 @@ def test_a_packing_has_no_overlaps_and_cannot_be_contracted(shape, method, attem
     made = scene(shape, 100, 0.2, duration=1e6, **options)
     result = run(made)
     assert result.status.ok
+    assert result.work["jammed"] == 1
     assert result.time < 1e6
     assert 0.45 < fraction(result, shape) < 0.72
     depth = deepest(result.state, made.domain.high[0], shape, result.state["radius"][0])
@@ -197,24 +197,13 @@ def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_ove
         size = result.state["radius"][0]
         assert deepest(result.state, made.domain.high[0], ROD, size) <= 1e-4 * (1 + 1e-9)
         assert result.work["contractions"] > 0
+        assert result.work["jammed"] == 0
+        assert result.measures["packing_fraction"] == pytest.approx(fraction(result, ROD), rel=1e-9)
 
 
 def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     scenes = [scene(ROD, 100 + k, 0.1, seed=k, duration=60.0, method="original") for k in range(3)]
-    usual = run(scenes)
-    (alone,) = run([scenes[1]])
-    simulation = Simulation(scenes[0], 3, capacity=102)
-    simulation.load(scenes)
-    simulation.run(steps=17)
-    save(simulation, tmp_path / "c.h5")
-    simulation.run(steps=3)
-    simulation.load(scenes)
-    restore(simulation, tmp_path / "c.h5")
-    simulation.run()
-    for other in (alone, simulation.results()[1]):
-        assert (other.time, other.work) == (usual[1].time, usual[1].work)
-        same_arrays(other.state, usual[1].state)
-    simulation.close()
+    same_bits(scenes, tmp_path, 17)
 
 
 def test_other_effects_and_domains_are_refused():
@@ -284,6 +273,29 @@ def test_shapes_may_be_given_for_each_body():
     np.testing.assert_allclose(growth, growth[0], rtol=1e-12)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_small_body_inside_a_large_one_moves_out(order):
+    """In the original method, whichever of both gives D, and also from a common centre."""
+    shapes = (SPHERE, SpherocylinderShape(length=0.0, diameter=10.0))[::order]
+    for distance in (0.0, 2.0):
+        particles = Particles(
+            position=[[20.0, 20.0, 20.0], [20.0 + distance, 20.0, 20.0]],
+            velocity=np.zeros((2, 3)),
+            mass=1.0,
+            radius=[one.bounding_radius() for one in shapes],
+            quantities={"shape": [0, 1]},
+        )
+        made = Scene(
+            particles=particles,
+            effects=[HardRods(rods=shapes)],
+            domain=Box(low=(0, 0, 0), high=(40, 40, 40)),
+            duration=40.0,
+            stepper=MechanicalContraction(method="original", volume_step=1e-9),
+        )
+        state = run(made).check().state
+        assert np.linalg.norm(np.diff(state["position"], axis=0)) == pytest.approx(5.5, rel=1e-3)
+
+
 def test_orientations_of_a_start_are_random_unless_given():
     made = scene(ROD, 400)
     axes = Rotation.from_quat(made.start()["orientation"], scalar_first=True).apply([0.0, 0.0, 1.0])
@@ -300,22 +312,7 @@ def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():
 
 
 def test_a_resumed_run_returns_to_its_last_configuration(tmp_path):
-    """Interrupted while overlaps remain, shortly before it gives up."""
     made = scene(SPHERE, 100, 0.45, duration=1e5, attempts=60, volume_step=8.0, method="original", halvings=1)
-    simulation = Simulation(made, 1)
-    simulation.load([made])
-    while int(simulation.s.read("attempted")[0]) < 50 or not int(simulation.s.read("contractions")[0]):
-        simulation.run(steps=1)
-    save(simulation, tmp_path / "c.h5")
-    simulation.run()
-    (expected,) = simulation.results()
-    simulation.load([made])
-    restore(simulation, tmp_path / "c.h5")
-    simulation.run()
-    (resumed,) = simulation.results()
-    assert resumed.time == expected.time
-    same_arrays(resumed.state, expected.state)
-    assert deepest(resumed.state, made.domain.high[0], SPHERE, resumed.state["radius"][0]) <= 1e-4 * (
-        1 + 1e-9
-    )
-    simulation.close()
+    result = resumed(made, tmp_path)
+    size = result.state["radius"][0]
+    assert deepest(result.state, made.domain.high[0], SPHERE, size) <= 1e-4 * (1 + 1e-9)

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.compare import same_arrays
 from tests.numerics.test_philox import reference
 from tests.steppers.packing import test_energy_minimisation
-from tests.steppers.packing.test_energy_minimisation import pair
-from tests.steppers.packing.test_mechanical_contraction import ROD, SPHERE, deepest, fraction
+from tests.steppers.packing.bits import same_bits
+from tests.steppers.packing.test_energy_minimisation import axes_of, pair, width
+from tests.steppers.packing.test_mechanical_contraction import (
+    CUBOID,
+    ELLIPSOID,
+    ROD,
+    SPHERE,
+    deepest,
+    fraction,
+)
 from tisim import InputError, Scene, Simulation, run
 from tisim.effects import Gravity
-from tisim.engine.checkpoint import restore, save
 from tisim.numerics.random_streams import TRIAL_MOVES
 from tisim.steppers import MonteCarloGrowth
 
@@ -40,11 +46,11 @@ def attempt(state, side, shape, length, rate, seed, step):
     x, radius, number = state["position"], state["radius"], len(state["radius"])
     before = Rotation.from_quat(state["orientation"], scalar_first=True)
     sizes = radius / shape.bounding_radius()
-    unit = sizes[0] * shape.diameter
+    unit = sizes[0] * width(shape)
     shift = length * unit * np.array([cube(seed, i, step, 0) for i in range(number)])
     turn = length * unit / radius[:, None] * np.array([cube(seed, i, step, 2) for i in range(number)])
     after = Rotation.from_rotvec(turn) * before
-    axes = [turns.apply([0.0, 0.0, 1.0]) for turns in (before, after)]
+    states = before, after
     conflict, room, overlap = np.zeros(number, bool), np.inf, False
     for i in range(number):
         for j in range(i):
@@ -55,7 +61,7 @@ def attempt(state, side, shape, length, rate, seed, step):
             gaps, rooms = [], []
             for a, b in ((0, 0), (1, 0), (0, 1), (1, 1)):
                 r = d + b * shift[j] - a * shift[i]
-                gap, normal, _, _ = pair(r, axes[a][i], axes[b][j], sizes[i], sizes[j], shape)
+                gap, normal, _, _ = pair(r, states[a][i], states[b][j], sizes[i], sizes[j], shape)
                 gaps.append(gap)
                 rooms.append(gap / (r @ normal - gap))
             stays = min(gaps[1:]) < min(gaps[0], 0)
@@ -68,7 +74,16 @@ def attempt(state, side, shape, length, rate, seed, step):
     return (x + np.where(moves, shift, 0.0)) % side, turns, growth * radius, moves.sum()
 
 
-@pytest.mark.parametrize(("shape", "number"), [(ROD, 80), (SPHERE, 30)], ids=["rods", "spheres"])
+@pytest.mark.parametrize(
+    ("shape", "number"),
+    [
+        (ROD, 80),
+        (SPHERE, 30),
+        pytest.param(ELLIPSOID, 30, marks=pytest.mark.slow),
+        pytest.param(CUBOID, 30, marks=pytest.mark.slow),
+    ],
+    ids=["rods", "spheres", "ellipsoids", "cuboids"],
+)
 def test_steps_equal_their_reference(shape, number):
     """From the overlaps of the start on, and later, while bodies grow."""
     rate = 0.01
@@ -76,17 +91,19 @@ def test_steps_equal_their_reference(shape, number):
     side, simulation = made.domain.high[0], Simulation(made, 1)
     simulation.load([made])
     moved, grown, step = 0, 0, 0
-    for wait in (1, 300):
-        simulation.run(steps=wait - 1) if wait > 1 else None
-        step += wait
+    for growing in (False, True):
+        while growing and (step < 300 or int(simulation.s.read("overlapping")[0])):
+            simulation.run(steps=100)
+            step += 100
         before = {name: np.array(simulation.state[name]) for name in ("position", "orientation", "radius")}
-        length = 0.1 if step == 1 else float(simulation.s.read("trial_length")[0])
-        places, turns, radii, moves = attempt(before, side, shape, length, rate, 5, step - 1)
+        length = float(simulation.s.read("trial_length")[0]) if growing else 0.1
+        places, turns, radii, moves = attempt(before, side, shape, length, rate, 5, step)
         simulation.run(steps=1)
+        step += 1
         off = np.array(simulation.state["position"]) - places
         np.testing.assert_allclose(off - side * np.round(off / side), 0, atol=1e-12)
         found = Rotation.from_quat(np.array(simulation.state["orientation"]), scalar_first=True)
-        axes = [one.apply([0.0, 0.0, 1.0]) for one in (found, turns)]
+        axes = [axes_of(one, shape) for one in (found, turns)]
         np.testing.assert_allclose(*axes, rtol=0, atol=1e-12)
         np.testing.assert_allclose(np.array(simulation.state["radius"]), radii, rtol=1e-12)
         moved, grown = moved + moves, grown + (radii[0] > before["radius"][0])
@@ -148,23 +165,20 @@ def test_rods_pack_at_a_higher_density_than_spheres():
     assert deepest(result.state, made.domain.high[0], shape, result.state["radius"][0]) < ROUNDING
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", [ELLIPSOID, CUBOID], ids=["ellipsoids", "cuboids"])
+def test_superquadrics_pack_at_a_higher_density_than_spheres(shape):
+    made = scene(shape, 60, precision=1e-2)
+    result = run(made)
+    assert result.work["jammed"] == 1
+    assert 0.64 < fraction(result, shape) < 0.78
+    assert deepest(result.state, made.domain.high[0], shape, result.state["radius"][0]) < ROUNDING
+
+
 def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     scenes = [scene(ROD, 100 + k, 0.1, seed=k, duration=700.0) for k in range(3)]
-    usual = run(scenes)
-    (alone,) = run([scenes[1]])
-    simulation = Simulation(scenes[0], 3, capacity=102)
-    simulation.load(scenes)
-    simulation.run(steps=417)
-    save(simulation, tmp_path / "c.h5")
-    simulation.run(steps=3)
-    simulation.load(scenes)
-    restore(simulation, tmp_path / "c.h5")
-    simulation.run()
-    for other in (alone, simulation.results()[1]):
-        assert (other.time, other.work, other.measures) == (usual[1].time, usual[1].work, usual[1].measures)
-        same_arrays(other.state, usual[1].state)
+    usual = same_bits(scenes, tmp_path, 417)
     assert usual[1].measures["packing_fraction"] > 0.15
-    simulation.close()
 
 
 def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():

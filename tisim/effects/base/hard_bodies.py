@@ -55,6 +55,11 @@ class HardBodies(Shaped, Pairwise):
         return self.shape_volume(w, s.shape[w, i]) / (d * d * d)
 
     @ti.func
+    def half_width(self, s, w, i):
+        """Return half the shortest side (m) of the box around a body: the radius of a rod."""
+        return self.size(s, w, i) * self.thickness(w, s.shape[w, i])
+
+    @ti.func
     def closest(self, s, w, i, j, separation):
         """Return the gap between two bodies (m, negative if they overlap), the unit normal from i to j, and
         the points of contact (m), each relative to the centre of its body. The gap of bodies that do not

@@ -1,9 +1,10 @@
 """Random packings of hard bodies by minimising the energy of overlaps, with bisection of the density."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, HardBodies
 from tisim.pairs.listed_pairs import sum_phases
@@ -88,6 +89,10 @@ class EnergyMinimisation(PackingStepper):
     first: float = parameter("", "first step dt of FIRE", 0.05, gt=0)
     longest: float = parameter("", "longest step dt of FIRE", 0.3, gt=0)
 
+    accuracy_parameters: ClassVar = (
+        AccuracyParameter(precision=1, tolerance=1),
+        AccuracyParameter(balance=1, converges=False),
+    )
     world_fields: ClassVar = (
         *PACKING_FIELDS,
         *ATTEMPT_FIELDS,
@@ -103,6 +108,10 @@ class EnergyMinimisation(PackingStepper):
         WorldField("fire_energy", "real"),
         WorldField("fire_downhill", "integer"),
     )
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        return (cls(),) if any(isinstance(effect, HardBodies) for effect in effects) else ()
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
         sums = (OVERLAP_PUSH, OVERLAP_TWIST, OVERLAP_ENERGY, DEEPEST_OVERLAP)
@@ -240,11 +249,10 @@ class MinimiseOrGrow(Phase):
         s = self.s
         density, jammed = s.packing_fraction[w], s.jammed_fraction[w]
         aim = density + ti.cast(self.stepper.fraction_step(w), ti.f64)
-        ends = last
         if jammed > 0.0:
             aim = 0.5 * (density + jammed)
-            ends = ends or jammed - density <= ti.cast(self.stepper.precision(w), ti.f64)
-        if ends:
+            s.jammed[w] = ti.cast(jammed - density <= ti.cast(self.stepper.precision(w), ti.f64), ti.i64)
+        if last or s.jammed[w] == 1:
             s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
         elif density > 0.0:
             s.growth[w] = self.space.growth(aim, density)

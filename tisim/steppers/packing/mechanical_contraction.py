@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import option, parameter
 from tisim.effects.base import Effect, HardBodies, SceneParts
 from tisim.errors import must
@@ -33,9 +34,13 @@ from tisim.steppers.packing.packing_stepper import (
     BeginAttempt,
     MoveOrReturn,
     PackingStepper,
+    body_volume,
 )
 from tisim.steppers.packing.space import CheckWidth, PackingSpace
 from tisim.steppers.verlet import Advance
+
+MEETING_AXES = 1e-6
+"""The least distance of two axes that the original method assumes, over the sum of the radii."""
 
 
 class MechanicalContraction(PackingStepper):
@@ -57,7 +62,7 @@ class MechanicalContraction(PackingStepper):
     as a contracting box up to the scale of all lengths. A cylinder or a wedge grows with the bodies, except
     along its periodic axis. If overlaps remain after ``attempts``, the world returns to its last
     configuration without overlaps, and contracts by half the step. It ends in that configuration after
-    ``halvings``.
+    ``halvings``. The measure ``packing_fraction`` of the result is its density.
 
     The original method is for rods. Overlaps of the start are removed first.
 
@@ -82,7 +87,33 @@ class MechanicalContraction(PackingStepper):
         WorldField("halved", "integer"),
         WorldField("box_volume", "real"),
         WorldField("volume_decrease", "real"),
+        WorldField("solid_volume", "real"),
+        WorldField("packing_fraction", "measure"),
     )
+
+    @property
+    def accuracy_parameters(self) -> tuple[AccuracyParameter, ...]:  # type: ignore[override]
+        # The distance from the jamming density is measured to fall as attempts^-0.5 (docs/packings.md). The
+        # other settings have no order; they change the number of attempts that are needed.
+        moved = (AccuracyParameter(motion=1, converges=False),) if self.method == "revised" else ()
+        return (
+            AccuracyParameter(attempts=-0.5, converges=False),
+            AccuracyParameter(volume_step=1, converges=False),
+            AccuracyParameter(tolerance=1, converges=False),
+            *moved,
+        )
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        hard = [effect for effect in effects if isinstance(effect, HardBodies)]
+        if not hard:
+            return ()
+        rods = all(shape.rod() for shape in hard[0].shapes())
+        return (cls(method="original" if rods else "revised", attempts=2000),)
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Any, ...]:
+        other = "original" if self.method == "revised" else "revised"
+        return (self.model_copy(update={"method": other}), *super().rivals(effects, dt))
 
     def check(self, scene: SceneParts) -> None:
         super().check(scene)
@@ -101,10 +132,15 @@ class MechanicalContraction(PackingStepper):
 
     @ti.func
     def weight(self, depth):
-        """Return the weight of an overlap (D) in the sums of a body."""
+        """Return the weight of an overlap in the sums of a body: in the original method the product of the
+        overlap and the distance of the axes, both over the sum of the radii.
+
+        depth : overlap over the sum of the radii.
+        """
         weight = 0.0 * depth + 1.0
         if ti.static(self.method == "original"):
-            weight = depth * (1.0 - depth)
+            # Axes that meet have a distance too, for otherwise nothing would move them apart.
+            weight = depth * ti.max(1.0 - depth, MEETING_AXES)
         return weight
 
     def step(self, context: StepContext) -> Step:
@@ -136,23 +172,30 @@ class ChooseAction(Phase):
     def run(self, w, _k):
         s = self.s
         if s.steps[w] == 0:
-            s.box_volume[w] = self.space.volume(w, self.bodies.size(s, w, 0) * self.bodies.unit(w, 0))
+            unit = self.bodies.size(s, w, 0) * self.bodies.unit(w, 0)
+            s.box_volume[w] = self.space.volume(w, unit)
+            # In D^3, so it stays the same while bodies grow.
+            s.solid_volume[w] = ti.cast(0.0, ti.f64)
+            for i in range(s.count[w]):
+                s.solid_volume[w] += body_volume(s, self.bodies, w, i) / ti.cast(unit, ti.f64) ** 3
             s.volume_decrease[w] = ti.cast(self.stepper.volume_step(w), ti.f64)
         last = s.end[w] - s.time[w] <= ti.cast(1.5, ti.f64) * ti.cast(self.control.dt(w), ti.f64)
         volume, ends = s.box_volume[w], False
+        given_up = s.attempted[w] >= self.stepper.attempts and s.contractions[w] > 0
         s.packing_action[w] = MOVE
         if s.overlapping[w] == 0:
             s.packing_action[w] = CONTRACT
             s.contractions[w] += 1
             s.attempted[w] = 0
-        elif (s.attempted[w] >= self.stepper.attempts and s.contractions[w] > 0) or last:
+        elif given_up or last:
             s.packing_action[w] = RETURN
             # The last contraction is taken back.
             volume += s.volume_decrease[w]
             s.attempted[w] = 0
             s.halved[w] += 1
             s.volume_decrease[w] = 0.5 * s.volume_decrease[w]
-            ends = s.halved[w] > self.stepper.halvings or last
+            s.jammed[w] = ti.cast(given_up and s.halved[w] > self.stepper.halvings, ti.i64)
+            ends = last or s.jammed[w] == 1
             if s.contractions[w] == 0:
                 # There is no configuration without overlaps to return to.
                 s.fail(w, WorldStatus.OVERLAPPING, 0)
@@ -161,9 +204,12 @@ class ChooseAction(Phase):
         s.growth[w] = 1.0
         if s.packing_action[w] != MOVE:
             s.box_volume[w] = volume
-            if not ends and not (last and s.packing_action[w] == CONTRACT):
+            if not (ends or last):
+                # Half of the volume remains, also after a step that is longer than the box.
+                s.volume_decrease[w] = ti.min(s.volume_decrease[w], 0.5 * volume)
                 s.box_volume[w] = volume - s.volume_decrease[w]
                 s.growth[w] = self.space.growth(volume, s.box_volume[w])
+        s.packing_fraction[w] = s.solid_volume[w] / s.box_volume[w]
         if ends:
             s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
+from tisim.components.accuracy_parameter import AccuracyParameter
 from tisim.components.component import parameter
 from tisim.effects.base import Effect, HardBodies
 from tisim.numerics import philox
@@ -63,9 +64,9 @@ class MonteCarloGrowth(PackingStepper):
     which can only decrease and are removed before bodies grow. As l is the room between bodies, ``rate`` has
     the meaning of the growth rate of Lubachevsky and Stillinger, a speed of growth over a thermal speed.
 
-    A world ends when l is below ``precision``. The measure ``packing_fraction`` of the result is its density,
-    and the counter ``jammed`` is 1 if it has ended so. One step takes the time ``dt`` of the control, so the
-    duration of a run is the largest number of steps.
+    A world ends when l is below ``precision``, and fails if there are still overlaps of the start then. The
+    measure ``packing_fraction`` of the result is its density. One step takes the time ``dt`` of the control,
+    so the duration of a run is the largest number of steps.
 
     Source: B. D. Lubachevsky, F. H. Stillinger, J. Stat. Phys. 60 (1990) 561, for growth at a rate;
     docs/packings.md for the rule of the moves.
@@ -79,18 +80,26 @@ class MonteCarloGrowth(PackingStepper):
     precision: float = parameter("D", "length of trial moves below which a world ends", 1e-4, gt=0)
     acceptance: float = parameter("", "fraction of trial moves that are accepted", 0.2, gt=0, lt=1)
 
+    # Slow growth leaves time for order, so there is no limit of random packings.
+    accuracy_parameters: ClassVar = (
+        AccuracyParameter(precision=1, converges=False),
+        AccuracyParameter(rate=1, converges=False),
+    )
     random: ClassVar = True
     confines: ClassVar = False
     world_fields: ClassVar = (
         *PACKING_FIELDS,
         WorldField("accepted_moves", "sum"),
-        WorldField("jammed", "counter"),
         WorldField("packing_fraction", "measure"),
         WorldField("trial_length", "real"),
         WorldField("trial_reach", "real", "m"),
         WorldField("largest_radius", "real", "m"),
         WorldField("least_room", "real"),
     )
+
+    @classmethod
+    def alternatives(cls, effects: Sequence[Effect], dt: float) -> tuple[Self, ...]:
+        return (cls(precision=1e-3),) if any(isinstance(effect, HardBodies) for effect in effects) else ()
 
     def fields(self, effects: Sequence[Effect]) -> tuple[str | Field, ...]:
         return (CONFLICT, CROWDING, OVERLAP_FLAG)
@@ -256,7 +265,13 @@ class SumConflicts(BodySum):
     def gap(self, w, i, j, separation):
         """Return the gap (m) between two bodies in the present state or after trial moves, and the relative
         growth of both that closes it at most."""
-        gap, normal, _here, _there = self.bodies.closest(self.trials, w, i, j, separation)
+        size = self.bodies.size(self.s, w, 0) * self.bodies.unit(w, 0)
+        # A wider gap does not limit the growth of a step.
+        far = 4.0 * self.stepper.rate(w) * ti.cast(self.s.trial_length[w], self.s.real) * size
+        turn_i, turn_j = self.bodies.turn(self.trials, w, i), self.bodies.turn(self.trials, w, j)
+        gap, normal, _here, _there = self.bodies.between(
+            self.trials, w, i, j, turn_i, turn_j, separation, far
+        )
         # The extents of both bodies along the normal, which grow in proportion.
         extent = separation.dot(normal) - gap
         return gap, gap / ti.select(extent > 0.0, extent, 1.0)
@@ -303,16 +318,17 @@ class GrowBodies(Phase):
         s = self.s
         length, side = s.trial_length[w], ti.cast(self.domain.side(w), ti.f64)
         last = s.end[w] - s.time[w] <= ti.cast(1.5, ti.f64) * ti.cast(self.control.dt(w), ti.f64)
+        finest = length < ti.cast(self.stepper.precision(w), ti.f64)
         s.growth[w] = 1.0
         if s.overlapping[w] == 0:
             size = ti.cast(self.bodies.size(s, w, 0) * self.bodies.unit(w, 0), ti.f64)
             most = ti.cast(self.stepper.rate(w), ti.f64) * length * size / s.largest_radius[w]
             growth = 1.0 + ti.min(most, 0.5 * s.least_room[w])
-            if length < ti.cast(self.stepper.precision(w), ti.f64):
+            if finest:
                 s.end[w], s.jammed[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64), 1
             else:
                 s.growth[w] = growth
-        elif last:
+        elif finest or last:
             s.fail(w, WorldStatus.OVERLAPPING, 0)
         s.largest_radius[w] = s.largest_radius[w] * s.growth[w]
         volume = self.sums.total(w)[0] * s.growth[w] ** 3

@@ -98,10 +98,46 @@ class BodySum(PairSum):
         """Use the finished sum of i over bodies and walls."""
 
 
-class SumOverlaps(BodySum):
+class MotionSum(BodySum):
+    """Base of the sums that set push and twist of each body and its ``further`` fields, the last of which is
+    a maximum."""
+
+    further: ClassVar[tuple[Field, ...]]
+
+    def __init__(self, context: StepContext, bodies: Bound[Any]) -> None:
+        super().__init__(context, bodies)
+        self.columns = tuple(getattr(context.s, one.name) for one in self.further)
+        self.components = 6 + len(self.columns)
+
+    @ti.func
+    def combine(self, a, b):
+        total = a + b
+        total[self.components - 1] = ti.max(a[self.components - 1], b[self.components - 1])
+        return total
+
+    @ti.func
+    def write_sum(self, w, i, total):
+        s = self.s
+        for k in ti.static(range(3)):
+            s.overlap_push[w, i][k], s.overlap_twist[w, i][k] = total[k], total[3 + k]
+        for k, column in ti.static(enumerate(self.columns)):
+            column[w, i] = total[6 + k]
+
+    @ti.func
+    def read_sum(self, w, i):
+        total = ti.Vector.zero(self.s.real, self.components)
+        push, twist = self.s.overlap_push[w, i], self.s.overlap_twist[w, i]
+        for k in ti.static(range(3)):
+            total[k], total[3 + k] = push[k], twist[k]
+        for k, column in ti.static(enumerate(self.columns)):
+            total[6 + k] = column[w, i]
+        return total
+
+
+class SumOverlaps(MotionSum):
     """This sum sets push and twist of each body, and the inverse of its smallest overlap."""
 
-    components = 7
+    further = (INVERSE_OVERLAP,)
 
     def together(self, laws: tuple[Any, ...]) -> ListedLaws:
         return ListedLaws(laws, 10, False)
@@ -109,8 +145,8 @@ class SumOverlaps(BodySum):
     @ti.func
     def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         depth, counts, normal, here, there = self.overlap(w, i, j, separation)
-        size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
-        weight = ti.select(counts, self.stepper.weight(depth / size), 0.0)
+        thickness = self.bodies.half_width(self.s, w, i) + self.bodies.half_width(self.s, w, j)
+        weight = ti.select(counts, self.stepper.weight(depth / thickness), 0.0)
         values = ti.Vector.zero(self.s.real, 10)
         push, turn_i, turn_j = weight * normal, -weight * here.cross(normal), weight * there.cross(normal)
         for k in ti.static(range(3)):
@@ -120,10 +156,10 @@ class SumOverlaps(BodySum):
 
     @ti.func
     def wall_term(self, w, i, depth, counts, normal, here):
-        size = self.bodies.size(self.s, w, i) * self.bodies.unit(w, 0)
         # Unlike another body, a wall may be deeper than D; the weight of the original method would change its
         # sign there.
-        weight = self.stepper.weight(ti.min(depth / size, DEEPEST_VIRTUAL))
+        part = depth / (2.0 * self.bodies.half_width(self.s, w, i))
+        weight = self.stepper.weight(ti.min(part, DEEPEST_VIRTUAL))
         push = -ti.select(counts, weight, 0.0) * normal
         turn, over = here.cross(push), ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
         return ti.Vector([push[0], push[1], push[2], turn[0], turn[1], turn[2], over])
@@ -135,25 +171,6 @@ class SumOverlaps(BodySum):
             ti.Vector([-push[0], -push[1], -push[2], here[0], here[1], here[2], values[9]]),
             ti.Vector([push[0], push[1], push[2], there[0], there[1], there[2], values[9]]),
         )
-
-    @ti.func
-    def combine(self, a, b):
-        total = a + b
-        total[6] = ti.max(a[6], b[6])
-        return total
-
-    @ti.func
-    def write_sum(self, w, i, total):
-        s = self.s
-        for k in ti.static(range(3)):
-            s.overlap_push[w, i][k], s.overlap_twist[w, i][k] = total[k], total[3 + k]
-        s.inverse_overlap[w, i] = total[6]
-
-    @ti.func
-    def read_sum(self, w, i):
-        s = self.s
-        push, twist = s.overlap_push[w, i], s.overlap_twist[w, i]
-        return ti.Vector([push[0], push[1], push[2], twist[0], twist[1], twist[2], s.inverse_overlap[w, i]])
 
     @ti.func
     def finish_body(self, w, i, total):
@@ -208,7 +225,7 @@ class RemovalRates(BodySum):
         self.write_sum(w, i, total)
 
 
-class SumSoftOverlaps(BodySum):
+class SumSoftOverlaps(MotionSum):
     """This sum sets force, torque and energy of bodies that repel each other by harmonic springs.
 
     The energy of a pair is (delta_ij/D_ij)^2 / 2, with the overlap delta_ij and the mean D_ij of both D. The
@@ -217,7 +234,7 @@ class SumSoftOverlaps(BodySum):
     change the overlap to first order.
     """
 
-    components = 8
+    further = (OVERLAP_ENERGY, DEEPEST_OVERLAP)
 
     def together(self, laws: tuple[Any, ...]) -> ListedLaws:
         return ListedLaws(laws, 16, False)
@@ -243,26 +260,6 @@ class SumSoftOverlaps(BodySum):
     @ti.func
     def pair_contributions(self, values):
         return piece(values, 0, 8), piece(values, 8, 8)
-
-    @ti.func
-    def combine(self, a, b):
-        total = a + b
-        total[7] = ti.max(a[7], b[7])
-        return total
-
-    @ti.func
-    def write_sum(self, w, i, total):
-        s = self.s
-        for k in ti.static(range(3)):
-            s.overlap_push[w, i][k], s.overlap_twist[w, i][k] = total[k], total[3 + k]
-        s.overlap_energy[w, i], s.deepest_overlap[w, i] = total[6], total[7]
-
-    @ti.func
-    def read_sum(self, w, i):
-        s = self.s
-        push, twist, energy = s.overlap_push[w, i], s.overlap_twist[w, i], s.overlap_energy[w, i]
-        deepest = s.deepest_overlap[w, i]
-        return ti.Vector([push[0], push[1], push[2], twist[0], twist[1], twist[2], energy, deepest])
 
     @ti.func
     def wall_term(self, w, i, depth, counts, normal, here):

@@ -26,8 +26,13 @@ ACCEPTED_FIELDS = (
     Field("accepted_radius", "m", 1, "keep", default="radius", recorded=False),
 )
 """The last configuration without overlaps; part of checkpoints, because a run may return to it."""
-PACKING_FIELDS = (WorldField("overlapping", "sum"), WorldField("growth", "real"))
-"""The number of bodies with overlaps, and the factor by which a step enlarges bodies."""
+PACKING_FIELDS = (
+    WorldField("overlapping", "sum"),
+    WorldField("growth", "real"),
+    WorldField("jammed", "counter"),
+)
+"""The number of bodies with overlaps, the factor by which a step enlarges bodies, and whether the world has
+ended because its bodies could not be brought closer, not because of its duration."""
 ATTEMPT_FIELDS = (WorldField("attempted", "integer"), WorldField("packing_action", "integer"))
 """The attempts to remove the overlaps of a contraction, and the action of a step."""
 MOVE, CONTRACT, RETURN = 0, 1, 2
@@ -47,7 +52,8 @@ class PackingStepper(Stepper):
     """Packing steppers bring hard bodies together in a periodic box of constant size: the bodies grow.
 
     The phases of a step end with ``BeginStep``, a subclass of ``MoveBodies``, ``CheckWidth`` and ``Advance``.
-    Before these, a step sets ``growth`` of the world.
+    Before these, a step sets ``growth`` of the world. The counter ``jammed`` of the result is 1 if a world
+    has ended because its bodies could not be brought closer, and 0 if its duration was reached first.
 
     confines : whether bodies may be packed between walls.
     """
@@ -74,6 +80,11 @@ class PackingStepper(Stepper):
 
     def independent(self, effects: Sequence[Effect]) -> bool:
         return False
+
+    def rivals(self, effects: Sequence[Effect], dt: float) -> tuple[Any, ...]:
+        # Other protocols, by name, so that the order does not depend on imports.
+        kinds = [kind for _, kind in sorted(PackingStepper.known().items()) if kind is not type(self)]
+        return tuple(other for kind in kinds for other in kind.alternatives(effects, dt))
 
 
 @ti.func
