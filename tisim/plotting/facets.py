@@ -31,7 +31,9 @@ MANY = 1000
 """Number of bodies from which each has a quarter of the facets, so that a picture takes seconds."""
 
 
-def facets(shape: ParticleShape, rings: int = FACET_RINGS, sectors: int = FACET_SECTORS) -> tuple[np.ndarray, np.ndarray]:
+def facets(
+    shape: ParticleShape, rings: int = FACET_RINGS, sectors: int = FACET_SECTORS
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners (m) and the unit normals of the facets of a shape, shape (f, 4, 3) and (f, 3).
 
     Corners are the farthest points along directions on rings about z, so there are few on flat faces and
