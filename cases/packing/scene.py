@@ -36,7 +36,7 @@ SEARCH_SETTINGS: dict[str, Any] = {
 """Settings of searches of every size."""
 SIZES = {
     "small": Size(
-        "60 bodies from a packing fraction of 0.2, 200 attempts",
+        "60 bodies from a packing fraction of 0.2, 200 attempts: a quick look, far from jammed",
         {"number": 60, "start": 0.2, "step": 2.0, "attempts": 200, "halvings": 3},
         {"generations": 8, "max_evaluations": 80, **SEARCH_SETTINGS},
     ),

@@ -191,7 +191,8 @@ def brief(explanation: Explanation) -> RenderableType:
         _line("Step, repeats with *", " > ".join(explanation.outline)),
         _line("Left out", left_out or "no effect"),
         _line(
-            "Cost of absent effects", f"no memory; run time with them over run time without {COST_OF_ABSENT}"
+            "Cost of absent effects",
+            f"no memory; run time with them over run time without, of the case vibration: {COST_OF_ABSENT}",
         ),
         "tisim effects NAME describes a part; --all lists fields, phases, sources and absent effects",
     )
