@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tisim import Box, Cloud, Scene, run
-from tisim.effects import Gravity
-from tisim.engine.batches import loaded
+from tisim.effects import Gravity, Impact
+from tisim.engine.batches import Batches, loaded
 from tisim.errors import InputError
 from tisim.steppers import FixedStep, Verlet
 
@@ -21,6 +21,25 @@ def falling(seed, **changes):
         "seed": seed,
     }
     return Scene(**{**parts, **changes})
+
+
+def test_a_scene_that_cannot_be_loaded_fails_alone_in_a_search():
+    """A box in which a grain could touch another one twice is refused when scenes are loaded, after their
+    start has been made."""
+    hard = {"effects": [Impact(hardness=1e5)], "stepper": Verlet(control=FixedStep(dt=1e-3))}
+    wide = [falling(seed, **hard) for seed in range(3)]
+    narrow = wide[1].replace({"particles.radius": 0.55, "particles.number": 2})
+    scenes = [wide[0], narrow, wide[2]]
+    batches = Batches()
+    results = dict(batches.run(scenes, strict=False))
+    assert [results[k].status.ok for k in range(3)] == [True, False, True]
+    assert "box must be at least" in results[1].status.reason
+    for k in (0, 2):
+        assert np.array_equal(results[k].state["position"], run(scenes[k]).state["position"])
+    assert not dict(batches.run([narrow], strict=False))[0].status.ok
+    with pytest.raises(InputError, match="box must be at least"):
+        dict(batches.run(scenes))
+    batches.close()
 
 
 def test_a_simulation_is_kept_and_gives_the_bits_of_run():

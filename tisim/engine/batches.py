@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import weakref
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, overload
 
@@ -89,15 +89,18 @@ class Batches:
                 else:
                     starts[index] = start
                     groups.setdefault(scene.structure(), []).append(index)
-        for index, reason in failures.items():
-            failed = Status(False, reason)
-            yield index, Result(scenes[index], {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
+        yield from _refused(scenes, failures)
         finished_scenes = len(failures)
         for structure, members in groups.items():
             with self.simulation(structure, [scenes[k] for k in members]) as simulation:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
-                    simulation.load([scenes[k] for k in batch], [starts.pop(k) for k in batch])
+                    refused = _load(simulation, batch, scenes, starts, strict)
+                    yield from _refused(scenes, refused)
+                    finished_scenes += len(refused)
+                    batch = [k for k in batch if k not in refused]
+                    if not batch:
+                        continue
                     observers = [recorder(simulation, batch)] if recorder else []
                     handed_on: set[int] = set()
                     for _ in simulation.chunks(observers=observers):
@@ -154,6 +157,38 @@ class Batches:
             old, self._idle = self._idle, []
         for each in old:
             each.close()
+
+
+def _load(
+    simulation: Simulation, batch: list[int], scenes: Sequence[Scene], starts: dict[int, Arrays], strict: bool
+) -> dict[int, str]:
+    """Load the scenes of a batch; return the reason for each that is refused, by index. These are left out.
+
+    A simulation refuses all scenes that are loaded together with one that it cannot load.
+    """
+    refused: dict[int, str] = {}
+    own = {k: starts.pop(k) for k in batch}
+    try:
+        simulation.load([scenes[k] for k in batch], list(own.values()))
+    except InputError:
+        if strict:
+            raise
+        for k in batch:
+            try:
+                simulation.load([scenes[k]], [own[k]])
+            except InputError as error:
+                refused[k] = str(error)
+        sound = [k for k in batch if k not in refused]
+        if sound:
+            simulation.load([scenes[k] for k in sound], [own[k] for k in sound])
+    return refused
+
+
+def _refused(scenes: Sequence[Scene], reasons: Mapping[int, str]) -> Iterator[tuple[int, Result]]:
+    """Yield a failed result for each refused scene."""
+    for index, reason in reasons.items():
+        failed = Status(False, reason)
+        yield index, Result(scenes[index], {}, {}, 0.0, {}, failed, 0.0, runtime.current().described)
 
 
 _lock = threading.Lock()
