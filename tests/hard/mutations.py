@@ -139,6 +139,11 @@ WALLS = {
         f"{MOTION}/translation.py", "return r - self.displacement", "return r - 0.99 * self.displacement",
         f"{MOVING}moving_walls_are_galilean_invariant",
     ),
+    "confinement": (
+        "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
+        "tests/steppers/packing/test_confinement.py::"
+        "test_an_attempt_equals_its_reference[spherocylinder_shape-cylindrical_container-exact]",
+    ),
 }  # fmt: skip
 """Mutations of walls and their motions."""
 MOTIONS, SHAPES = "tisim/effects/constraint", "tests/effects/constraint/test_rigid_shapes.py::test_"
@@ -146,11 +151,6 @@ MUTATIONS = {**PARTS_OF_LAWS, **SOFT_GRAINS, **BONDED, **WALLS}
 STEPS = "tests/hard/test_granular_steps.py::test_steps_beyond_the_limit_stop_the_world"
 HERTZ_MINDLIN = "tests/effects/contact/test_hertz_mindlin.py::test_"
 SHARED = {
-    "confinement": (
-        "tisim/geometry/round_containers.py", "0.5 * self.diameter(w)", "0.49 * self.diameter(w)",
-        "tests/steppers/packing/test_confinement.py::"
-        "test_an_attempt_equals_its_reference[spherocylinder_shape-cylindrical_container-exact]",
-    ),
     "corners_of_rods": (
         f"{MOTIONS}/rigid_rods.py", "self.rod_radius(s, w, i))", "0.99 * self.rod_radius(s, w, i))",
         f"{SHAPES}a_rod_falls_and_comes_to_rest_on_both_ends",

@@ -35,6 +35,7 @@ def means(change=0.0):
     return np.stack([values.mean(axis=1), values.std(axis=1, ddof=1) / np.sqrt(STARTS)], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_fitness_of_packing_equals_the_record():
     now, record = means(), np.array(list(DENSE.values()))

@@ -59,6 +59,7 @@ def test_designs_of_too_many_bodies_are_refused():
         problem("paper")
 
 
+@pytest.mark.slow
 def test_short_rods_are_denser_than_spheres_and_two_sizes_denser_than_one():
     """Spheres of one size, rods, and spheres of two sizes."""
     designs = [
@@ -95,6 +96,7 @@ def test_surface_and_permeability_are_of_the_designed_size():
     assert 4 < details({}, one)["contact number"] < 7
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_without_a_design_that_outgrows_its_box(monkeypatch):
     monkeypatch.setattr(searching, "SLENDER", 0.01)
     searched = problem("small").fix(**EQUAL)

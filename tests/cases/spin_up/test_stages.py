@@ -1,7 +1,5 @@
 """Spin-up of piles: L21's numbers, the rotation of a pile, and its deformation and disruption."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -26,7 +24,7 @@ def test_a_size_without_a_duration_settles_for_the_duration_of_the_scene(monkeyp
         made.extend(scenes)
         raise Loaded
 
-    monkeypatch.setattr(stages, "Simulation", lambda *a: SimpleNamespace(load=load, close=lambda: None))
+    monkeypatch.setattr(stages, "loaded", load)
     with pytest.raises(Loaded):
         spin_ups(1, number=8, rates=(1e-4, 5e-4), holds=(5.0, 7.0))
     assert [one.duration for one in made] == [15_000.0 + 5.0 + 7.0] * 3

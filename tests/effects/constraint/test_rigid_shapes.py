@@ -46,6 +46,7 @@ from tisim.steppers import Boris, FixedStep
 
 pytestmark = pytest.mark.long
 SHAPES = {"rods": ROD, "eggs": EGG, "bricks": BRICK}
+QUICK_SHAPES = ["rods", "eggs", pytest.param("bricks", marks=pytest.mark.slow)]
 ELASTIC = Granular(normal=HertzMaterial())
 LAW = Granular(
     normal=HertzMaterial(),
@@ -176,7 +177,7 @@ def test_rods_stick_by_springs_as_in_a_numpy_reference():
     np.testing.assert_array_less(errors, [3e-3, 4e-4])
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", QUICK_SHAPES)
 def test_an_elastic_collision_keeps_energy_momentum_and_angular_momentum(name):
     errors = []
     for dt in (2e-6, 1e-6, 5e-7):
@@ -193,7 +194,7 @@ def test_an_elastic_collision_keeps_energy_momentum_and_angular_momentum(name):
     assert errors[2] < 0.3 * errors[0]
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", QUICK_SHAPES)
 def test_friction_and_rolling_keep_momentum_and_angular_momentum(name):
     (result,) = simulate([colliding(SHAPES[name], LAW)])
     start, end = result.start, result.state
@@ -203,7 +204,7 @@ def test_friction_and_rolling_keep_momentum_and_angular_momentum(name):
     assert 0.2 < energy(end) / energy(start) < 0.8
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", QUICK_SHAPES)
 def test_restitution_holds_wherever_a_body_hits_a_floor(name):
     """Without friction the impulse is J = (1 + e) u / (1/m + (r x n) I^-1 (r x n)), for a point of contact r
     that approaches at a speed u."""
@@ -283,6 +284,7 @@ def test_a_rod_falls_and_comes_to_rest_on_both_ends():
     assert D / 2 - state["position"][0, 2] == pytest.approx(deep, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_brick_comes_to_rest_on_its_largest_face():
     made = moving(BRICK, [(0, 0, 3 * D)], (LAW, WEIGHT, FLOOR), 4e-6, 150_000,
                   orientation=Rotation.from_rotvec([0.3, 0.5, 0.2]).as_quat(scalar_first=True),

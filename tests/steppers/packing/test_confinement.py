@@ -133,8 +133,8 @@ ATTEMPTS = [
 ]
 
 
-QUICK_ATTEMPTS = (ATTEMPTS[0], ATTEMPTS[3], ATTEMPTS[10])
-"""A rod by exact distances, a rod by virtual bodies, and a superquadric."""
+QUICK_ATTEMPTS = (ATTEMPTS[0], ATTEMPTS[3])
+"""A rod by exact distances, and a rod by virtual bodies."""
 
 
 @pytest.mark.parametrize(

@@ -186,6 +186,7 @@ def test_forces_and_torques_of_the_reference_are_derivatives_of_its_energy(rng):
     assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(power, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_spheres_jam_at_random_close_packing():
     made = [scene(SPHERE, 100, seed=k, precision=1e-4) for k in range(3)]
     densities = []

@@ -126,7 +126,12 @@ def attempt(
 
 @pytest.mark.parametrize(
     ("shape", "method"),
-    [(ROD, "revised"), (ROD, "original"), (ELLIPSOID, "revised"), (CUBOID, "revised")],
+    [
+        (ROD, "revised"),
+        (ROD, "original"),
+        (ELLIPSOID, "revised"),
+        pytest.param(CUBOID, "revised", marks=pytest.mark.slow),
+    ],
     ids=["revised", "original", "ellipsoids", "cuboids"],
 )
 def test_an_attempt_equals_its_reference(shape, method):
