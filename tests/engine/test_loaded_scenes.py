@@ -5,6 +5,7 @@ import pytest
 
 from tisim import Box, Cloud, Scene, run
 from tisim.effects import Gravity, Impact
+from tisim.engine import batches
 from tisim.engine.batches import Batches, loaded
 from tisim.errors import InputError
 from tisim.steppers import FixedStep, Verlet
@@ -30,16 +31,16 @@ def test_a_scene_that_cannot_be_loaded_fails_alone_in_a_search():
     wide = [falling(seed, **hard) for seed in range(3)]
     narrow = wide[1].replace({"particles.radius": 0.55, "particles.number": 2})
     scenes = [wide[0], narrow, wide[2]]
-    batches = Batches()
-    results = dict(batches.run(scenes, strict=False))
+    own = Batches()
+    results = dict(own.run(scenes, strict=False))
     assert [results[k].status.ok for k in range(3)] == [True, False, True]
     assert "box must be at least" in results[1].status.reason
     for k in (0, 2):
         assert np.array_equal(results[k].state["position"], run(scenes[k]).state["position"])
-    assert not dict(batches.run([narrow], strict=False))[0].status.ok
+    assert not dict(own.run([narrow], strict=False))[0].status.ok
     with pytest.raises(InputError, match="box must be at least"):
-        dict(batches.run(scenes))
-    batches.close()
+        dict(own.run(scenes))
+    own.close()
 
 
 def test_a_simulation_is_kept_and_gives_the_bits_of_run():
@@ -53,6 +54,14 @@ def test_a_simulation_is_kept_and_gives_the_bits_of_run():
             kept.append(simulation)
         assert np.array_equal(result.state["position"], run(one).state["position"])
     assert kept[0] is kept[1]
+
+
+def test_all_scenes_are_loaded_at_once_whatever_the_size_of_a_batch(monkeypatch):
+    monkeypatch.setattr(batches, "BATCH_PARTICLES", 10)
+    scenes = [falling(seed, domain=Box(low=(-2.0, -1.0, -1.0), high=(1.0, 1.0, 1.0))) for seed in range(3)]
+    with loaded(scenes) as simulation:
+        assert len(simulation.states) == 3
+    assert all(result.status.ok for result in run(scenes))
 
 
 def test_a_start_is_loaded_whatever_was_done_before():

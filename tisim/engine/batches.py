@@ -112,16 +112,20 @@ class Batches:
                     finished_scenes += len(batch)
 
     @contextmanager
-    def simulation(self, structure: Any, scenes: Sequence[Scene]) -> Iterator[Simulation]:
-        """Yield a compiled simulation for scenes of this structure, reserved for this caller meanwhile."""
+    def simulation(self, structure: Any, scenes: Sequence[Scene], least: int = 1) -> Iterator[Simulation]:
+        """Yield a compiled simulation for scenes of this structure, reserved for this caller meanwhile.
+
+        least : number of worlds that it has at least, whatever the limits of a batch.
+        """
         capacity = max(scene.capacity() for scene in scenes)
-        worlds = max(1, min(len(scenes), self.limit, BATCH_PARTICLES // capacity))
+        most = max(least, min(self.limit, BATCH_PARTICLES // capacity))
+        worlds = min(len(scenes), most)
         simulation = self._reusable(structure, worlds, capacity)
         if simulation is None:
             _restart_taichi()
             capacity = rounded(capacity)
             few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE else 1
-            worlds = max(1, min(max(few, rounded(worlds)), self.limit, BATCH_PARTICLES // capacity))
+            worlds = min(max(few, rounded(worlds)), max(least, min(self.limit, BATCH_PARTICLES // capacity)))
             simulation = Simulation(scenes[0], worlds, capacity)
         try:
             yield simulation
@@ -242,7 +246,7 @@ def loaded(scenes: Sequence[Scene]) -> Iterator[Simulation]:
     The simulation is kept for later calls, as those of ``run`` are. Kernels are never freed, so a search that
     made a new one for each design would need more and more memory.
     """
-    with runtime.turn, _batches.simulation(scenes[0].structure(), scenes) as simulation:
+    with runtime.turn, _batches.simulation(scenes[0].structure(), scenes, len(scenes)) as simulation:
         simulation.load(scenes)
         yield simulation
 
