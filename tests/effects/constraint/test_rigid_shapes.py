@@ -46,7 +46,7 @@ from tisim.steppers import Boris, FixedStep
 
 pytestmark = pytest.mark.long
 SHAPES = {"rods": ROD, "eggs": EGG, "bricks": BRICK}
-QUICK_SHAPES = ["rods", "eggs", pytest.param("bricks", marks=pytest.mark.slow)]
+QUICK_SHAPES = ["rods", *(pytest.param(name, marks=pytest.mark.slow) for name in ("eggs", "bricks"))]
 ELASTIC = Granular(normal=HertzMaterial())
 LAW = Granular(
     normal=HertzMaterial(),
@@ -248,6 +248,7 @@ def test_a_rod_hits_another_head_on_with_the_restitution_of_the_material():
         np.testing.assert_allclose(result.state["spin"], 0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_rods_of_length_0_are_spheres():
     """They hit each other and the floor, spinning, with friction; the difference is of first order in dt."""
     velocity, spin = [(0.3, 0, -0.4), (-0.2, 0, -0.1)], [(10.0, 200.0, -30.0)] * 2

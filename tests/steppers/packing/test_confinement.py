@@ -337,6 +337,7 @@ def test_a_single_row_in_the_smallest_wedge(degrees):
     assert fraction(run(made)) == pytest.approx(closed, rel=3e-4)
 
 
+@pytest.mark.slow
 def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     """In wedges of different lengths, whose bodies begin behind the walls in part."""
     scenes = [

@@ -143,7 +143,7 @@ def axes_of(turns, shape):
 @pytest.mark.parametrize(
     ("shape", "number"),
     [
-        (ROD, 80),
+        pytest.param(ROD, 80, marks=pytest.mark.slow),
         (SPHERE, 30),
         pytest.param(ELLIPSOID, 40, marks=pytest.mark.slow),
         pytest.param(CUBOID, 40, marks=pytest.mark.slow),

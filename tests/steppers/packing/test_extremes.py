@@ -33,6 +33,7 @@ ENDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ENDS, ids=lambda kind: kind.kind())
 def test_ends_of_ranges(kind):
     cases = [(name, value) for name, values in ENDS[kind].items() for value in values]
