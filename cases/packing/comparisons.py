@@ -1,11 +1,11 @@
-"""The numbers of B16 chapters 2 to 4 beside those of the studies, as lines of a table."""
+"""Tables with the numbers of B16 chapters 2 to 4 and the numbers of the studies, side by side."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import linregress
+from scipy.stats import linregress, t
 
 from tisim.analysis import Mean
 from tisim.analysis.packings.orientational_order import random_nematic_order, random_order
@@ -151,7 +151,7 @@ def of_cylinders(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterat
         yield Compared(f"<C> below 2 D, {who}", "2", text(Mean.of(contacts)))
         wide = [one for one in some if one.width >= WIDE_CYLINDER]
         fit = linregress([1 / one.width for one in wide], [one.fraction for one in wide])
-        half = 2.0 * float(fit.intercept_stderr)
+        half = float(t.ppf(0.975, len(wide) - 2) * fit.intercept_stderr)
         here = f"{text(Mean(float(fit.intercept), half))}; periodic {text(full['fraction'])}"
         yield Compared(f"phi at 1/D_cyl = 0, {who}", "periodic value", here)
         if aspect > 1:

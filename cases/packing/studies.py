@@ -89,7 +89,7 @@ class PackedPlan:
         return None
 
     def options(self, size: str, **settings: Any) -> dict[str, Any]:
-        """Return the arguments of ``of_shape``. settings : of ``scene``, which replace those of the size."""
+        """Return the arguments of ``of_shape``. settings : arguments of ``scene``; they override the size."""
         usual = {"halvings": 4, "tolerance": 1e-4, **size_named(size, SIZES).scene, **settings}
         around, start = self.container(), self.start
         if around is not None and start is None:
@@ -218,7 +218,8 @@ def measured_packings(
 ) -> Iterator[tuple[PackedRow, MeasuredPacking]]:
     """Pack the plans from random starts; yield the line and the packing of each as it ends.
 
-    made : keys of packings that are left out. settings : of ``scene``, which replace those of the size.
+    made : keys of packings that exist already and are left out. settings : arguments of ``scene``; they
+    override the size.
     """
     each = [
         (plan, given(plan, plan.options(size, **settings), seed)) for plan in chosen for seed in range(starts)

@@ -193,7 +193,7 @@ def test_contacts_of_a_row_of_spheres():
 
 
 def test_pictures_of_packings():
-    """Those of the first seeds, with the segment of a cylinder, and the directions in a wedge."""
+    """Packings of the first seed are drawn, of a cylinder one segment; rods in a wedge by direction."""
     plans_of = [
         PackedPlan("cylinder", 1.0, width=2.3),
         PackedPlan("wedge", 3.0, width=2 * shortest(3.0, 9.0), angle=9.0),

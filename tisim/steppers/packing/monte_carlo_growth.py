@@ -60,9 +60,10 @@ class MonteCarloGrowth(PackingStepper):
     weight. The length l is adjusted such that a fraction ``acceptance`` of the moves is accepted.
 
     In the same step the bodies grow, by ``rate`` l D in the radius of the largest one, or by half of the room
-    between the two closest bodies if that is less. There are never overlaps, except those of the start,
-    which can only decrease and are removed before bodies grow. As l is the room between bodies, ``rate`` has
-    the meaning of the growth rate of Lubachevsky and Stillinger, a speed of growth over a thermal speed.
+    between the two closest bodies if that is less. Bodies never overlap, unless they do so at the start;
+    such overlaps can only decrease, and are removed before bodies grow. As l is the room between bodies,
+    ``rate`` has the meaning of the growth rate of Lubachevsky and Stillinger, a speed of growth over a
+    thermal speed.
 
     A world ends when l is below ``precision``, and fails if there are still overlaps of the start then. The
     measure ``packing_fraction`` of the result is its density. One step takes the time ``dt`` of the control,
