@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from tests.sources.fields import fields
 from tisim import InputError
-from tisim.backend import runtime
 from tisim.sources import Cylinder, MagneticCylinders, sample
 from tisim.sources.magnetic import cell_sum, cylinder_rows
 from tisim.sources.magnetic.local_expansions import gaps
@@ -184,14 +183,20 @@ def test_approximations_for_tisim_cost(rng):
     assert MagneticCylinders(cylinders=fibres(rng, 12), sum_digits=3).approximations(1.0) == ()
 
 
-def test_single_precision(rng):
-    """Cells are as accurate in f32; the wanted digits may be too many."""
+def in_this_precision():
+    """The errors with three digits, and the message for five."""
+    rng = np.random.Generator(np.random.Philox(3))
     cylinders = fibres(rng, 12)
-    points = about(rng, cylinders)[:400]
-    before = runtime.current()
-    runtime.init(before.device, "f32", before.threads, before.arithmetic)
+    found = errors(cylinders, about(rng, cylinders)[:400], sum_digits=3)
     try:
-        found = errors(cylinders, points, sum_digits=3)
-    finally:
-        runtime.init(before.device, before.precision, before.threads, before.arithmetic)
-    assert max(found) < 1e-3
+        errors(cylinders, np.zeros((1, 3)), sum_digits=5)
+    except InputError as fault:
+        return *found, str(fault)
+    return *found, ""
+
+
+def test_single_precision(single):
+    """Cells are as accurate in f32, but five digits are too many."""
+    of_b, of_slope, message = single("sources.magnetic.test_sum_by_cells", "in_this_precision")
+    assert max(of_b, of_slope) < 1e-3
+    assert message == "sum_digits must be fewer for these cylinders in f32; received 5"

@@ -19,6 +19,8 @@ from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 
+NEAR_TOGETHER, FEWEST_TOGETHER = 8, 3
+"""Number of near cylinders that are evaluated together, and the smallest number for which this is faster."""
 MANY = 10
 """Number of cylinders from which a sum by cells is tried as an approximation."""
 
@@ -101,55 +103,80 @@ class MagneticCylinders(Magnets):
         bound, digits, cells = peers.bound(self), self.table_digits, self.sum_digits
         bound.cylinders.ends = ClosedEnds() if digits is None else TabulatedEnds(bound.table, digits)
         capacity = Cylinder.list_capacity(len(self.cylinders))
-        in_cells = None if cells is None else CellSum(bound.cells, capacity, cells)
-        return {**super().connect(peers), "in_cells": in_cells, "has_cells": cells is not None}
+        octree = None if cells is None else CellSum(bound.cells, capacity, cells)
+        return {**super().connect(peers), "octree": octree, "has_cells": cells is not None}
 
     @ti.func
     def value(self, w, r, t):
         b = 0.0 * r
-        if ti.static(not self.has_cells):
-            b = self.direct_value(w, r)
-        else:
+        if ti.static(self.has_cells):
             b = self.by_cells(w, r, False)[0]
+        else:
+            for k in range(self.each.size(w)):
+                b += self.each.flux_density(w, k, r)
         return b
 
     @ti.func
     def value_and_gradient(self, w, r, t):
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        if ti.static(not self.has_cells):
-            b, gradient = self.direct(w, r)
-        else:
+        if ti.static(self.has_cells):
             b, gradient = self.by_cells(w, r, True)
+        else:
+            for k in range(self.each.size(w)):
+                one, slope = self.each.flux(w, k, r)
+                b += one
+                gradient += slope
         return b, gradient
 
     @ti.func
     def by_cells(self, w, r, slopes: ti.template()):  # type: ignore[valid-type]
-        """Return the field at r from the cell around it, and the gradient, 0 unless ``slopes``."""
+        """Return the field at r from the cell around it, and its gradient, 0 unless ``slopes``."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        leaf, x, half = self.in_cells.leaf(w, r)
-        first, end, listed = 0, self.each.size(w), False
+        leaf, x, half = self.octree.leaf(w, r)
+        first, end, listed = 0, self.each.size(w), 0
         if leaf >= 0:
-            begin, last = self.in_cells.near(w, leaf)
+            begin, last = self.octree.near(w, leaf)
             if last >= begin:
-                first, end, listed = begin, last, True
-                b, gradient = self.in_cells.distant(w, leaf, x, half, slopes)
-        for e in range(first, end):
-            k = e
-            if listed:
-                k = self.in_cells.index(w, e)
-            if ti.static(slopes):
-                one, slope = self.each.flux(w, k, r)
+                first, end, listed = begin, last, 1
+                b, gradient = self.octree.distant(w, leaf, x, half, slopes)
+        lanes = ti.static(NEAR_TOGETHER)
+        for group in range((end - first + lanes - 1) // lanes):
+            start = first + group * lanes
+            count = ti.min(lanes, end - start)
+            chosen, left = ti.Vector([0] * lanes, ti.i32), ti.Vector([1] * lanes, ti.i32)
+            found = [ti.Vector([0.0 * half] * lanes) for _ in ti.static(range(12 if slopes else 3))]
+            for lane in range(lanes):
+                chosen[lane] = self.octree.index(w, ti.min(start + lane, end - 1), listed)
+            if count >= FEWEST_TOGETHER:
+                for lane in range(lanes):
+                    one, slope, right = self.each.flux_mostly(w, chosen[lane], r)
+                    left[lane] = ti.select(right, 0, 1)
+                    for a in ti.static(range(3)):
+                        found[a][lane] = one[a]
+                        for c in ti.static(range(len(found) // 3 - 1)):
+                            found[3 + 3 * a + c][lane] = slope[a, c]
+            for lane in range(count):
+                one = ti.Vector([found[a][lane] for a in ti.static(range(3))])
+                slope = 0.0 * gradient
+                if ti.static(slopes):
+                    for a, c in ti.static(ti.ndrange(3, 3)):
+                        slope[a, c] = found[3 + 3 * a + c][lane]
+                if left[lane] > 0:
+                    if ti.static(slopes):
+                        one, slope = self.each.flux(w, chosen[lane], r)
+                    else:
+                        one = self.each.flux_density(w, chosen[lane], r)
                 b += one
                 gradient += slope
-            else:
-                b += self.each.flux_density(w, k, r)
         return b, gradient
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        if ti.static(not self.has_cells):
-            self.add_direct(w, r, value, gradient)
-        else:
+        # The points of a tile are in different cells.
+        if ti.static(self.has_cells):
             for lane in range(ti.static(r[0].n)):
-                one, slope = self.value_and_gradient(w, ti.Vector([r[0][lane], r[1][lane], r[2][lane]]), t)
+                place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
+                one, slope = self.by_cells(w, place, True)
                 add_point(value, gradient, lane, one, slope)
+        else:
+            self.add_each(w, r, value, gradient)

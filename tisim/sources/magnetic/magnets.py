@@ -65,7 +65,10 @@ class Magnets(Source):
 
     @ti.func
     def value(self, w, r, t):
-        return self.direct_value(w, r)
+        b = 0.0 * r
+        for k in range(self.each.size(w)):
+            b += self.each.flux_density(w, k, r)
+        return b
 
     @ti.func
     def gradient(self, w, r, t):
@@ -73,23 +76,6 @@ class Magnets(Source):
 
     @ti.func
     def value_and_gradient(self, w, r, t):
-        return self.direct(w, r)
-
-    @ti.func
-    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        self.add_direct(w, r, value, gradient)
-
-    @ti.func
-    def direct_value(self, w, r):
-        """Return the field at r (m), the sum over the bodies one by one."""
-        b = 0.0 * r
-        for k in range(self.each.size(w)):
-            b += self.each.flux_density(w, k, r)
-        return b
-
-    @ti.func
-    def direct(self, w, r):
-        """Return the field at r (m) and its gradient, the sums over the bodies one by one."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
         for k in range(self.each.size(w)):
             one, slope = self.each.flux(w, k, r)
@@ -98,8 +84,12 @@ class Magnets(Source):
         return b, gradient
 
     @ti.func
-    def add_direct(self, w, r: ti.template(), value: ti.template(), gradient: ti.template()):  # type: ignore
-        """Add the sums over the bodies one by one, at a tile of points (see ``add_tile``)."""
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        self.add_each(w, r, value, gradient)
+
+    @ti.func
+    def add_each(self, w, r: ti.template(), value: ti.template(), gradient: ti.template()):  # type: ignore
+        """Add field and gradient of the bodies one by one at a tile of points, as ``add_tile`` does."""
         # First the points for which the vectorised form is valid, then the others one by one; a tile of one
         # point has no vectors.
         size = ti.static(r[0].n)
