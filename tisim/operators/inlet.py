@@ -29,6 +29,8 @@ ENTRY_FIELDS = (
     Field("entered_at", "s", 1, "keep", default=-1.0, double=True),
     Field("entry_trials", "", 1, "keep", integer=True),
 )
+PARTICLE_NUMBERS = ("waiting_particles", "captured_particles", "free_particles")
+"""Measures: the numbers of particles by state."""
 
 
 class Inlet(Directed, FilledRegion, TouchingMagnets):
@@ -118,10 +120,12 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         captured = (state.get("captured_by", none) >= 0) & ~waiting
         exited = state.get("exited_at", none) >= 0
         free = ~(waiting | captured | exited)
-        return dict(zip(STATES, (float(one.sum()) for one in (waiting, captured, free)), strict=True))
+        return dict(
+            zip(PARTICLE_NUMBERS, (float(one.sum()) for one in (waiting, captured, free)), strict=True)
+        )
 
     def measured(self) -> dict[str, str]:
-        return {**super().measured(), **dict.fromkeys(STATES, "")}
+        return {**super().measured(), **dict.fromkeys(PARTICLE_NUMBERS, "")}
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
@@ -175,7 +179,3 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         one = philox.uniform(philox.bits(s.seed[w], INLET, s.id[w, i], trial, 0))
         two = philox.uniform(philox.bits(s.seed[w], INLET, s.id[w, i], trial, 1))
         return ti.Vector([one[0], one[1], two[0], two[1]], dt=ti.f64)
-
-
-STATES = ("waiting_particles", "captured_particles", "free_particles")
-"""Measures: numbers of particles by state."""
