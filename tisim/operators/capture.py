@@ -98,12 +98,17 @@ class Capture(TouchingMagnets):
                     inward = ti.min(s.velocity[w, i].dot(outward), 0.0)
                     s.velocity[w, i] -= inward * outward
         if ti.static(self.releases):
-            if s.captured_by[w, i] >= 0 and s.adheres[w, i] == 0 and s.captured_at[w, i] < t:
-                outward = self.outward(w, s.captured_by[w, i], s.position[w, i])
-                if not self.holds(s, w, i, t, outward):
-                    s.fixed[w, i], s.captured_by[w, i], s.captured_at[w, i] = 0, -1, -1.0
-                    s.released_at[w, i] = ti.cast(t, s.real)
-                    ti.atomic_add(s.releases[w], 1)
+            self.let_go(s, w, i, t)
+
+    @ti.func
+    def let_go(self, s, w, i, t):
+        """Release particle i if it was captured in an earlier step and nothing holds it any more."""
+        if s.captured_by[w, i] >= 0 and s.adheres[w, i] == 0 and s.captured_at[w, i] < t:
+            outward = self.outward(w, s.captured_by[w, i], s.position[w, i])
+            if not self.holds(s, w, i, t, outward):
+                s.fixed[w, i], s.captured_by[w, i], s.captured_at[w, i] = 0, -1, -1.0
+                s.released_at[w, i] = ti.cast(t, s.real)
+                ti.atomic_add(s.releases[w], 1)
 
     @ti.func
     def capture(self, s, w, i, by, t):

@@ -29,6 +29,8 @@ ENTRY_FIELDS = (
     Field("entered_at", "s", 1, "keep", default=-1.0, double=True),
     Field("entry_trials", "", 1, "keep", integer=True),
 )
+PARTICLE_NUMBERS = ("waiting_particles", "captured_particles", "free_particles")
+"""Measures: the numbers of particles by state."""
 
 
 class Inlet(Directed, FilledRegion, TouchingMagnets):
@@ -37,13 +39,13 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         P(place) ~ u.n,    P(time) uniform between begin and end
 
     All particles of the start wait, unless it gives them an ``entered_at`` of 0 or more; a waiting particle
-    is ``fixed`` and takes part in nothing, wherever the start has placed it. Entry times are independent: the
-    feed is a Poisson process of as many particles as the start has. At the end of the step that contains its
-    time, a particle is placed at random in the region, with a density proportional to the velocity u.n of the
-    flow along ``direction``, as in a suspension of uniform concentration, and moves on with the velocity of
-    the flow. Places at which it would touch a magnet are rejected; where nothing flows, nothing enters. If
-    all ``tries`` trials fail, it is tried again in the next step. A short time from ``begin`` to ``end`` is a
-    pulse, a long one a step of the concentration.
+    is ``fixed``, at rest, and takes part in nothing, wherever the start has placed it. Entry times are
+    independent: the feed is a Poisson process of as many particles as the start has. At the end of the step
+    that contains its time, a particle is placed at random in the region, with a density proportional to the
+    velocity u.n of the flow along ``direction``, as in a suspension of uniform concentration, and moves on
+    with the velocity of the flow. Places at which it would touch a magnet are rejected; where nothing flows,
+    nothing enters. If all ``tries`` trials fail, it is tried again in the next step. A short time from
+    ``begin`` to ``end`` is a pulse, a long one a step of the concentration.
 
     Particles that diffuse back through the upstream face of the region are reflected there: the flux into the
     region is exactly that of the feed (P. V. Danckwerts, Chem. Eng. Sci. 2 (1953) 1).
@@ -105,7 +107,12 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         times = self.begin + (self.end - self.begin) * draw.random(n)
         waits = entered < 0
         fixed = np.where(waits, 1, start.get("fixed", np.zeros(n, int)))
-        return {"fixed": fixed, "entered_at": entered, "enters_at": np.where(waits, times, entered)}
+        return {
+            "velocity": np.where(waits[:, None], 0.0, start["velocity"]),
+            "fixed": fixed,
+            "entered_at": entered,
+            "enters_at": np.where(waits, times, entered),
+        }
 
     def measures(self, state: Mapping[str, np.ndarray]) -> dict[str, float]:
         waiting = state["entered_at"] < 0
@@ -113,10 +120,12 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         captured = (state.get("captured_by", none) >= 0) & ~waiting
         exited = state.get("exited_at", none) >= 0
         free = ~(waiting | captured | exited)
-        return dict(zip(NUMBERS, (float(one.sum()) for one in (waiting, captured, free)), strict=True))
+        return dict(
+            zip(PARTICLE_NUMBERS, (float(one.sum()) for one in (waiting, captured, free)), strict=True)
+        )
 
     def measured(self) -> dict[str, str]:
-        return {**super().measured(), **dict.fromkeys(NUMBERS, "")}
+        return {**super().measured(), **dict.fromkeys(PARTICLE_NUMBERS, "")}
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
@@ -170,7 +179,3 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         one = philox.uniform(philox.bits(s.seed[w], INLET, s.id[w, i], trial, 0))
         two = philox.uniform(philox.bits(s.seed[w], INLET, s.id[w, i], trial, 1))
         return ti.Vector([one[0], one[1], two[0], two[1]], dt=ti.f64)
-
-
-NUMBERS = ("waiting_particles", "captured_particles", "free_particles")
-"""Measures of the numbers of particles."""

@@ -230,7 +230,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
 
     @ti.func
     def give(self, s, w, c, i):
-        """Set the further quantities that the class of a particle defines, those of its core by its radius."""
+        """Set the further quantities that the class of a particle defines; those of its core, by its
+        radius."""
         for given in ti.static(self.given_fields):
             if ti.static(given[2] == 3):
                 given[0][w, i] = ti.Vector([self.given[c, given[1] + m] for m in range(3)])

@@ -32,7 +32,10 @@ class MagneticCore(Component):
     )
     shell: float = parameter("m", "thickness of the shell that is not magnetic", 0.0, ge=0)
     ratio: float = parameter(
-        "", "geometric standard deviation of the moments of grains of one size; 1 for equal moments", 1.0, ge=1
+        "",
+        "geometric standard deviation of the moments of grains of one size; 1 for equal moments",
+        1.0,
+        ge=1,
     )
     domain: float | None = parameter(
         "m", "radius of a magnetic domain in the core; the whole core unless given", None, gt=0

@@ -59,9 +59,14 @@ class MagneticCylinders(Magnets):
         if self.table_digits is not None:
             return ()
         try:
-            return tuple(type(self)(cylinders=self.cylinders, table_digits=digits) for digits in (3, 4, 5))
+            return tuple(self.with_table(digits) for digits in (3, 4, 5))
         except InputError:
             return ()
+
+    def with_table(self, digits: int) -> Self:
+        """Return a copy that reads its field from a table; InputError if a cylinder is too short."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**given, "table_digits": digits})
 
     def lookups(self) -> dict[str, np.ndarray]:
         return {} if self.table_digits is None else {"cells": table(self.table_digits)[0]}
