@@ -14,14 +14,14 @@ from tisim.components.component import Vector
 from tisim.errors import InputError, RunError, Words, is_number, is_whole, must
 from tisim.sources.pore_flow.connectivity import through_paths
 from tisim.sources.pore_flow.no_slip import NoSlip
-from tisim.sources.pore_flow.solids import Column, Grid, Solid
+from tisim.sources.pore_flow.solids import Column, Grid, SolidBody
 from tisim.sources.pore_flow.stokes_operator import StokesOperator
 
 TOLERANCE = 1e-4
 """Velocity at walls over the mean velocity at which iterations end."""
-LEAST, MOST = 1e-7, 0.1
+TOLERANCES = (1e-7, 0.1)
 """Range of the tolerance; rounding ends the convergence near 1e-8."""
-MOST_ITERATIONS = 5000
+ITERATION_LIMIT = 5000
 FEWEST_CELLS = 2
 """Cells that the thinnest body must span."""
 
@@ -80,7 +80,7 @@ class StokesFlow:
 
 
 def stokes_flow(
-    solids: Sequence[Solid],
+    solids: Sequence[SolidBody],
     low: ArrayLike,
     high: ArrayLike,
     cells: Sequence[int],
@@ -120,7 +120,8 @@ def stokes_flow(
     grid = _grid(low, high, cells, column, axis)
     drive = -np.asarray(pressure_gradient, float)
     must(is_number(viscosity) and viscosity > 0, "viscosity", "above 0 Pa s", viscosity)
-    must(LEAST <= tolerance <= MOST, "tolerance", f"from {LEAST:g} to {MOST:g}", tolerance)
+    least, most = TOLERANCES
+    must(least <= tolerance <= most, "tolerance", f"from {least:g} to {most:g}", tolerance)
     strength = float(np.linalg.norm(drive))
     must(0 < strength < math.inf, "pressure_gradient", "finite and not 0", tuple(-drive))
     across = np.delete(drive, axis) if column != "none" else np.zeros(2)
@@ -156,7 +157,7 @@ def stokes_flow(
 
 
 def permeability_tensor(
-    solids: Sequence[Solid],
+    solids: Sequence[SolidBody],
     low: ArrayLike,
     high: ArrayLike,
     cells: Sequence[int],
@@ -189,7 +190,7 @@ def _grid(low: ArrayLike, high: ArrayLike, cells: Sequence[int], column: Column,
     return grid
 
 
-def _check_resolved(solids: Sequence[Solid], grid: Grid) -> None:
+def _check_resolved(solids: Sequence[SolidBody], grid: Grid) -> None:
     """Raise InputError unless bodies or walls resist the fluid, and bodies are wider than cells."""
     must(bool(solids) or grid.column != "none", "solids", "bodies, or a column with walls", Words("none"))
     used = np.array(grid.cells) > 1
@@ -254,7 +255,7 @@ def _forces(
     r = -apply(f) - operator.velocity(inside).reshape(-1)[walls.index]
     z, mean = precondition(r)
     p, product, first = z.copy(), (r * z).sum(), 0.0
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, ITERATION_LIMIT + 1):
         response = apply(p)
         step = product / (p * response).sum()
         f += step * p
@@ -269,5 +270,5 @@ def _forces(
         before, product = product, (r * z).sum()
         p = z + (product / before) * p
     raise RunError(
-        f"the flow through the matrix has not converged in {MOST_ITERATIONS} iterations: {residual:g}"
+        f"the flow through the matrix has not converged in {ITERATION_LIMIT} iterations: {residual:g}"
     )
