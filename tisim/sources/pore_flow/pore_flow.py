@@ -126,7 +126,7 @@ class PoreFlow(Source):
         must(min(self.cells) >= 1, f"{label}.cells", "whole numbers, at least 1", self.cells)
         free = self.column == "none"
         some = bool(self.cylinders or self.spheres) or not free
-        rule = f"given, or {label}.spheres, or a column with walls"
+        rule = "given, or spheres, or a column with walls"
         must(some, f"{label}.cylinders", rule, Words("none of them"))
         must(free or self.outside == "periodic", f"{label}.outside", "'periodic' with a column", self.outside)
         across = [c for a, c in zip(AXIS_NAMES, self.direction, strict=True) if a != self.axis]
