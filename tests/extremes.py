@@ -136,6 +136,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "ewald_langevin_moment": {"temperature": 300.0, **EWALD},
     "insertion_by_flux": {"low": [0.0, 0.0, 5e-3], "high": [0.02, 0.02, 0.02], "number": 3},
     "insertion_by_fraction": {"low": [0.0, 0.0, 0.02], "high": [0.02, 0.02, 0.04], "number": 3},
+    "inlet": {"low": [0.0, 0.0, 5e-3], "high": [0.02, 0.02, 6e-3], "end": 1e-4},
     "at_rest": {"time": 2e-4, "reference_acceleration": 9.81},
     "join_group": {"time": 1e-4},
     "mean_force": {"begin": 1e-4},

@@ -15,7 +15,7 @@ from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.describe.explain import known_effects
 from tisim.effects import Confinement, Effect, HardBodies, HardRods
-from tisim.sources import MagneticField, PoreFlow
+from tisim.sources import MagneticField, PoreFlow, UniformFlow
 from tisim.steppers import DriftLimit, FixedStep, Stepper
 
 
@@ -153,7 +153,7 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
     for contract in kind.requires:
         partners |= with_needed(next(other for other in known_effects() if issubclass(other, contract)))
     if kind.requires_source:
-        partners |= with_needed(MagneticField)
+        partners |= with_needed(UniformFlow if "flow_velocity" in kind.requires_source else MagneticField)
     rows = {name: [_required(row)] for name, row in kind.lists()}
     return {**partners, kind.kind(): serialization.to_dict(kind(**_required(kind), **rows), named=False)}
 

@@ -11,10 +11,11 @@ from .flow import (
 from .flow import (
     kozeny_carman as kozeny_carman,
 )
-from .magnetic.cylinder import Cylinder as Cylinder
+from .magnetic.cylinder_body import Cylinder as Cylinder
 from .magnetic.cylinder import MagneticCylinders as MagneticCylinders
 from .magnetic.magnets import Body as Body
 from .magnetic.magnets import Magnets as Magnets
+from .magnetic.mutual_magnetisation import magnetise as magnetise
 from .magnetic.sphere import MagneticSpheres as MagneticSpheres
 from .magnetic.sphere import Sphere as Sphere
 from .pore_flow.pore_flow import PoreFlow as PoreFlow
