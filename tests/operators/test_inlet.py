@@ -158,6 +158,16 @@ def test_diffusion_back_through_the_inlet_is_reflected():
 
 
 @pytest.mark.long
+def test_particles_diffuse_from_their_first_step_on():
+    """They enter within a point, at most 8 steps before the end."""
+    entry = inlet(high=(1e-12,) * 3, begin=48.1 * DT, end=53.0 * DT)
+    (result,) = run(filtered(500, entry=entry, steps=56))
+    state = by_id(result)
+    width = np.sqrt(2 * DIFFUSIVITY * (result.time - state["entered_at"]))
+    assert stats.kstest((state["position"][:, :2] / width[:, None]).ravel(), "norm").pvalue > 0.01
+
+
+@pytest.mark.long
 def test_no_particle_ever_enters():
     """Nothing flows in, the flow goes the other way, or the feed begins after the run."""
     still, backward, later = run(
