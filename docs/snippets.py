@@ -98,6 +98,8 @@ EFFECTS = {
     f" length=5e-3, magnetisation=(0, 0, 1e6))]), {SOFT}, Magnetophoresis()",
     "magnetic_field": "MagneticField(constant=(0.0, 0.0, 0.1)), Lorentz()",
     "magnetic_spheres": f"{MAGNET}, {SOFT}, Magnetophoresis()",
+    "pore_flow": "PoreFlow(low=(-5e-3, -5e-3, -5e-3), high=(5e-3, 5e-3, 5e-3), cells=(16, 16, 16), speed=1.0,"
+    f" viscosity=1e-3, spheres=[Sphere(centre=(0, 0, -3e-3), radius=1.5e-3)]), {DRAG}",
     "uniform_flow": f"UniformFlow(velocity=(1.0, 0.0, 0.0)), {DRAG}",
     "at_rest": "Gravity(), AtRest(time=2e-4)",
     "capture": "MagneticCylinders(cylinders=[Cylinder(centre=(0, 0, -1.5e-3), radius=1e-3,"
