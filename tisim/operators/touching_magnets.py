@@ -25,7 +25,11 @@ class TouchingMagnets(Operator):
         r from its surface (m) and the unit vector along which this distance increases."""
         before, by, least, outward = 0, -1, radius, 0.0 * r
         for magnets in ti.static(self.magnets):
-            for k in range(magnets.each.size(w)):
+            first, end, listed = magnets.nearby(w, r, radius)
+            for e in range(first, end):
+                k = e
+                if listed:
+                    k = magnets.near_body(w, e)
                 distance, normal = magnets.each.nearest(w, k, r)
                 if distance <= least:
                     least, by, outward = distance, before + k, normal

@@ -16,9 +16,12 @@ from tisim.sources.magnetic.cell_sum import CellSum, cell_row
 from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
+from tisim.sources.magnetic.local_expansions import LEAST_GAP
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 
+NEAR_REACH = LEAST_GAP - 3**0.5
+"""Distance from any point of a leaf within which all cylinders are near, in half sides."""
 MANY = 10
 """Number of cylinders from which a sum by cells is tried as an approximation."""
 
@@ -109,10 +112,10 @@ class MagneticCylinders(Magnets):
     @ti.func
     def value(self, w, r, t):
         b = 0.0 * r
-        if ti.static(not self.has_cells):
-            b = self.direct_value(w, r, t)
-        else:
+        if ti.static(self.has_cells):
             b = self.by_cells(w, r, t, False)[0]
+        else:
+            b = self.direct_value(w, r, t)
         return b
 
     @ti.func
@@ -128,24 +131,49 @@ class MagneticCylinders(Magnets):
     def by_cells(self, w, r, t, slopes: ti.template()):  # type: ignore[valid-type]
         """Return the field at r from the cell around it, and the gradient, 0 unless ``slopes``."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        leaf, x, half = self.in_cells.leaf(w, r)
-        first, end, listed = 0, self.magnetised(w, t), False
-        if leaf >= 0 and end > 0:
+        if self.magnetised(w, t) > 0:
+            leaf, x, half = self.in_cells.leaf(w, r)
+            first, end, listed = self.listed(w, leaf)
+            if listed:
+                b, gradient = self.in_cells.distant(w, leaf, x, half, slopes)
+            for e in range(first, end):
+                k = e
+                if listed:
+                    k = self.in_cells.index(w, e)
+                if ti.static(slopes):
+                    one, slope = self.each.flux(w, k, r)
+                    b += one
+                    gradient += slope
+                else:
+                    b += self.each.flux_density(w, k, r)
+        return b, gradient
+
+    @ti.func
+    def listed(self, w, leaf):
+        """Return the range of places in the list of near cylinders of a leaf, and True; without a list the
+        indices of all cylinders, and False."""
+        first, end, listed = 0, self.each.size(w), False
+        if leaf >= 0:
             begin, last = self.in_cells.near(w, leaf)
             if last >= begin:
                 first, end, listed = begin, last, True
-                b, gradient = self.in_cells.distant(w, leaf, x, half, slopes)
-        for e in range(first, end):
-            k = e
-            if listed:
-                k = self.in_cells.index(w, e)
-            if ti.static(slopes):
-                one, slope = self.each.flux(w, k, r)
-                b += one
-                gradient += slope
-            else:
-                b += self.each.flux_density(w, k, r)
-        return b, gradient
+        return first, end, listed
+
+    @ti.func
+    def nearby(self, w, r, radius):
+        first, end, listed = 0, self.each.size(w), False
+        if ti.static(self.has_cells):
+            leaf, _x, half = self.in_cells.leaf(w, r)
+            if radius < NEAR_REACH * half:
+                first, end, listed = self.listed(w, leaf)
+        return first, end, listed
+
+    @ti.func
+    def near_body(self, w, e):
+        k = e
+        if ti.static(self.has_cells):
+            k = self.in_cells.index(w, e)
+        return k
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore

@@ -133,6 +133,17 @@ class Magnets(Switched):
                         b, slope = self.each.flux(w, k, place)
                         add_point(value, gradient, lane, b, slope)
 
+    @ti.func
+    def nearby(self, w, r, radius):
+        """Return a range of places in the list of bodies near r (m), in which are all bodies that a sphere of
+        a radius (m) at r may touch, and whether the list is ``near_body``; otherwise places are indices."""
+        return 0, self.each.size(w), False
+
+    @ti.func
+    def near_body(self, w, e):
+        """Return the index of the body at a place of the list of bodies near r."""
+        return e
+
     def connect(self, peers: Peers) -> dict[str, Any]:
         ((bodies, _),) = self.lists()
         return {"each": getattr(peers.bound(self), bodies)}
