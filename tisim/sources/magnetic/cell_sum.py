@@ -186,9 +186,9 @@ class CellSum:
         return ti.cast(self.number(w, at), ti.i32), ti.cast(self.number(w, at + 1), ti.i32)
 
     @ti.func
-    def index(self, w, e, listed):
-        """Return the index of the cylinder at place e in the list, or e itself unless ``listed``."""
-        return ti.select(listed > 0, ti.cast(self.number(w, self.listed + listed * e), ti.i32), e)
+    def index(self, w, e):
+        """Return the index of the cylinder at a place in the list."""
+        return ti.cast(self.number(w, self.listed + e), ti.i32)
 
     @ti.func
     def distant(self, w, leaf, x, half, slopes: ti.template()):  # type: ignore[valid-type]
