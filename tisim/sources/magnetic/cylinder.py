@@ -115,9 +115,9 @@ class MagneticCylinders(Magnets):
     def value(self, w, r, t):
         b = 0.0 * r
         if ti.static(self.has_cells):
-            b = self.by_cells(w, r, t, False)[0]
+            b += self.by_cells(w, r, t, False)[0]
         else:
-            b = self.direct_value(w, r, t)
+            b += self.direct_value(w, r, t)
         return b
 
     @ti.func
@@ -157,7 +157,7 @@ class MagneticCylinders(Magnets):
             chosen[lane] = start + ti.min(lane, count - 1)
             if listed:
                 chosen[lane] = self.in_cells.index(w, chosen[lane])
-        if count >= FEWEST_TOGETHER:
+        if ti.static(self.table_digits is None) and count >= FEWEST_TOGETHER:
             # Without branches, so that compilers vectorise; then those for which this is invalid.
             for lane in range(lanes):
                 one, slope, right = self.each.flux_mostly(w, chosen[lane], r)
