@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import model_validator
 
+from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option
 from tisim.errors import must
@@ -23,9 +24,14 @@ from tisim.state.bound import Peers
 NEAR_REACH = LEAST_GAP - 3**0.5
 """Distance from any point of a leaf within which all cylinders are near, in half sides."""
 NEAR_TOGETHER, FEWEST_TOGETHER = 8, 3
-"""Number of near cylinders that are evaluated together, and the smallest number for which this is faster."""
-MANY = 10
+"""Number of near cylinders that a CPU evaluates together, and the smallest number for which it does."""
+FEWEST_IN_CELLS = 10
 """Number of cylinders from which a sum by cells is tried as an approximation."""
+
+
+def near_together() -> int:
+    """Return the number of near cylinders that are evaluated together."""
+    return NEAR_TOGETHER if runtime.current().device == "cpu" else 1
 
 
 class MagneticCylinders(Magnets):
@@ -59,6 +65,11 @@ class MagneticCylinders(Magnets):
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
+    in_cells: ClassVar[Any]
+    """The octree of a world, in the bound source."""
+    has_cells: ClassVar[bool]
+    """Whether the sum is by cells, in the bound source."""
+
     cylinders: tuple[Cylinder, ...] = option("the cylinders; worlds of a batch may have different numbers")
     table_digits: int | None = option(
         "digits of accuracy of field and gradient from a table; closed forms unless given",
@@ -85,8 +96,8 @@ class MagneticCylinders(Magnets):
             return ()
         short = any(one.length < one.radius for one in self.cylinders)
         by_table = () if short else (3, 4, 5)
-        by_cells = (3, 4, 5) if len(self.cylinders) >= MANY else ()
-        ways = [(table, None) for table in by_table]
+        by_cells = (3, 4, 5) if len(self.cylinders) >= FEWEST_IN_CELLS else ()
+        ways: list[tuple[int | None, int | None]] = [(digits, None) for digits in by_table]
         for digits in by_cells:
             ways += [(table, digits) for table in (digits, None) if table is None or by_table]
         ways.sort(key=lambda way: way[1] or way[0] or 0)
@@ -138,18 +149,19 @@ class MagneticCylinders(Magnets):
             first, end, listed = self.listed(w, leaf)
             if listed:
                 b, gradient = self.in_cells.distant(w, leaf, x, half, slopes)
-            for group in range((end - first + NEAR_TOGETHER - 1) // NEAR_TOGETHER):
-                start = first + group * NEAR_TOGETHER
-                one, slope = self.together(w, r, start, ti.min(end - start, NEAR_TOGETHER), listed, slopes)
+            lanes = ti.static(near_together())
+            for group in range((end - first + lanes - 1) // lanes):
+                start = first + group * lanes
+                one, slope = self.together(w, r, start, ti.min(end - start, lanes), listed, slopes)
                 b += one
                 gradient += slope
         return b, gradient
 
     @ti.func
     def together(self, w, r, start, count, listed, slopes: ti.template()):  # type: ignore[valid-type]
-        """Return the field and the gradient, 0 unless ``slopes``, of at most ``NEAR_TOGETHER`` cylinders from
-        a place in the list of near cylinders on, or from an index on if it is not ``listed``."""
-        lanes = ti.static(NEAR_TOGETHER)
+        """Return the field and the gradient, 0 unless ``slopes``, of ``count`` cylinders, at most
+        ``near_together``, from a place in the list of near cylinders on, or from an index on."""
+        lanes = ti.static(near_together())
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
         chosen, left = ti.Vector([0] * lanes, ti.i32), ti.Vector([1] * lanes, ti.i32)
         found = [ti.Vector([0.0 * r[0]] * lanes) for _ in ti.static(range(12 if slopes else 3))]
@@ -157,7 +169,7 @@ class MagneticCylinders(Magnets):
             chosen[lane] = start + ti.min(lane, count - 1)
             if listed:
                 chosen[lane] = self.in_cells.index(w, chosen[lane])
-        if ti.static(self.table_digits is None) and count >= FEWEST_TOGETHER:
+        if ti.static(not self.table_digits) and count >= FEWEST_TOGETHER:
             # Without branches, so that compilers vectorise; then those for which this is invalid.
             for lane in range(lanes):
                 one, slope, right = self.each.flux_mostly(w, chosen[lane], r)
