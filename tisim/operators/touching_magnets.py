@@ -27,9 +27,7 @@ class TouchingMagnets(Operator):
         for magnets in ti.static(self.magnets):
             first, end, listed = magnets.nearby(w, r, radius)
             for e in range(first, end):
-                k = e
-                if listed:
-                    k = magnets.near_body(w, e)
+                k = magnets.body(w, e, listed)
                 distance, normal = magnets.each.nearest(w, k, r)
                 if distance <= least:
                     least, by, outward = distance, before + k, normal
