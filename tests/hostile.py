@@ -15,7 +15,7 @@ from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.describe.explain import known_effects
 from tisim.effects import Confinement, Effect, HardBodies, HardRods
-from tisim.sources import MagneticField, UniformFlow
+from tisim.sources import MagneticField, PoreFlow, UniformFlow
 from tisim.steppers import DriftLimit, FixedStep, Stepper
 
 
@@ -171,7 +171,10 @@ def _required(kind: type[Component]) -> dict[str, Any]:
     options = {name: kind.model_fields[name] for name in others if kind.model_fields[name].is_required()}
     # The number of waves that the cut-off requires.
     more = {"waves": (12, 12, 12)} if "waves" in kind.model_fields else {}
-    return {**values, **{name: info.examples[0] for name, info in options.items() if info.examples}, **more}
+    # Either of two drives, and a grid that is solved in a moment.
+    drive = {"speed": 0.5, "cells": (16, 16, 16)} if kind is PoreFlow else {}
+    examples = {name: info.examples[0] for name, info in options.items() if info.examples}
+    return {**values, **examples, **more, **drive}
 
 
 def materials() -> dict[str, Any]:

@@ -53,7 +53,7 @@ class NoSlip:
         index, compliance, counts = [], [], []
         for a, distance in enumerate(distances):
             kappa, next_to_fluid = _kappa(distance, solid[a], spacing)
-            # Solid faces of a cell with a fluid face are included too, because they close this cell.
+            # SolidBody faces of a cell with a fluid face are included too, because they close this cell.
             shell = solid[a] & (wet | np.roll(wet, 1, a) | next_to_fluid)
             found = np.flatnonzero(shell | (kappa > 0))
             index.append(found + a * kappa.size)

@@ -18,11 +18,11 @@ from tisim.errors import Words, must
 from tisim.sources.base import Source, option, parameter
 from tisim.sources.magnetic.cylinder import Cylinder
 from tisim.sources.magnetic.sphere import Sphere
-from tisim.sources.pore_flow.solids import Column, Grid, Solid, SolidCylinder, SolidSphere
-from tisim.sources.pore_flow.stokes_flow import LEAST, MOST, TOLERANCE, stokes_flow
+from tisim.sources.pore_flow.solids import Column, Grid, SolidBody, SolidCylinder, SolidSphere
+from tisim.sources.pore_flow.stokes_flow import TOLERANCE, TOLERANCES, stokes_flow
 
-AXES = ("x", "y", "z")
-MOST_BYTES = 500_000_000
+AXIS_NAMES = ("x", "y", "z")
+KEPT_BYTES = 500_000_000
 """Memory of solved flows that are kept for later scenes of the process, at least one of them."""
 WHOLE_PERIODS = 1e-9
 """Relative rounding of the number of periods of the flow in a domain."""
@@ -86,17 +86,24 @@ class PoreFlow(Source):
         "component of the superficial velocity along the direction, unless the pressure gradient is given",
         None,
         ge=0,
+        examples=[1e-3],
     )
     viscosity: float = parameter("Pa s", "dynamic viscosity eta of the fluid", examples=[1e-3], gt=0)
-    cylinders: tuple[Cylinder, ...] = option("the fibres; worlds of a batch may have different ones", ())
-    spheres: tuple[Sphere, ...] = option("spheres; worlds of a batch may have different ones", ())
+    cylinders: tuple[Cylinder, ...] = option(
+        "the fibres; worlds of a batch may have different ones",
+        (),
+        examples=[(Cylinder(radius=1e-4, length=5e-4),)],
+    )
+    spheres: tuple[Sphere, ...] = option("spheres; worlds may have different ones", (), examples=[()])
     cells: tuple[int, int, int] = option("cells of the grid along x, y and z", (64, 64, 64))
     column: Column = option("walls around the matrix: none, a rectangular duct or a round tube", "none")
     axis: Literal["x", "y", "z"] = option("axis along which a duct or a tube is open", "z")
     outside: Literal["periodic", "uniform"] = option(
         "velocity outside of the box: of its periodic images, or the superficial velocity", "periodic"
     )
-    tolerance: float = option("velocity at walls over the mean velocity", TOLERANCE, ge=LEAST, le=MOST)
+    tolerance: float = option(
+        "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
+    )
 
     if TYPE_CHECKING:
         grid: ClassVar[Any]
@@ -118,8 +125,11 @@ class PoreFlow(Source):
         must(ordered, f"{label}.high", f"above {label}.low in every component", self.high)
         must(min(self.cells) >= 1, f"{label}.cells", "whole numbers, at least 1", self.cells)
         free = self.column == "none"
+        some = bool(self.cylinders or self.spheres) or not free
+        rule = "given, or spheres, or a column with walls"
+        must(some, f"{label}.cylinders", rule, Words("none of them"))
         must(free or self.outside == "periodic", f"{label}.outside", "'periodic' with a column", self.outside)
-        across = [c for a, c in zip(AXES, self.direction, strict=True) if a != self.axis]
+        across = [c for a, c in zip(AXIS_NAMES, self.direction, strict=True) if a != self.axis]
         along = free or not any(across)
         must(along, f"{label}.direction", f"along the {self.column}, {self.axis}", self.direction)
         return self
@@ -129,7 +139,7 @@ class PoreFlow(Source):
         given = {"pressure_gradient": self.pressure_gradient or 0.0, "speed": self.speed or 0.0}
         return super(PoreFlow, self.model_copy(update=given)).values()
 
-    def solids(self) -> list[Solid]:
+    def solids(self) -> list[SolidBody]:
         """Return the bodies of the matrix."""
         return [
             *(SolidCylinder(one.centre, one.direction, one.radius, one.length) for one in self.cylinders),
@@ -148,7 +158,7 @@ class PoreFlow(Source):
             with compiling():
                 flow = stokes_flow(
                     solids, self.low, self.high, self.cells, (-n).tolist(), 1.0, self.column,
-                    AXES.index(self.axis), self.tolerance,
+                    AXIS_NAMES.index(self.axis), self.tolerance,
                 )  # fmt: skip
             along = float(flow.mean_velocity @ n)
             velocity = flow.velocity / along
@@ -156,7 +166,7 @@ class PoreFlow(Source):
             velocity[np.abs(velocity) < 1e-30] = 0.0
             _solved[key] = UnitFlow(velocity, flow.mean_velocity / along, flow.permeability)
         _solved.move_to_end(key)
-        while len(_solved) > 1 and sum(one.velocity.nbytes for one in _solved.values()) > MOST_BYTES:
+        while len(_solved) > 1 and sum(one.velocity.nbytes for one in _solved.values()) > KEPT_BYTES:
             _solved.popitem(last=False)
         return _solved[key]
 
@@ -184,7 +194,7 @@ class PoreFlow(Source):
         if self.outside != "periodic" or low is None or high is None:
             return
         periods = (high - low) / np.subtract(self.high, self.low)
-        for axis, joined, number in zip(AXES, scene.domain.joined(), periods, strict=True):
+        for axis, joined, number in zip(AXIS_NAMES, scene.domain.joined(), periods, strict=True):
             fits = not joined or abs(number / max(round(number), 1) - 1) < WHOLE_PERIODS
             rule = f"a whole part of the side of the periodic domain along {axis}"
             must(fits, f"the box of {self.label}", rule, Words(f"{1 / number:g} of it"))
@@ -206,7 +216,7 @@ class PoreFlow(Source):
     @property
     def _grid(self) -> Grid:
         spacing = np.subtract(self.high, self.low) / self.cells
-        return Grid(np.array(self.low), spacing, self.cells, self.column, AXES.index(self.axis))
+        return Grid(np.array(self.low), spacing, self.cells, self.column, AXIS_NAMES.index(self.axis))
 
     @ti.func
     def value(self, w, r, t):

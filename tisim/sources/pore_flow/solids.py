@@ -14,11 +14,11 @@ from tisim.components.component import Vector
 
 Column = Literal["none", "duct", "tube"]
 """The walls around a matrix: none; a rectangular duct; a round tube."""
-MARGIN = 2
+WINDOW_CELLS = 2
 """Cells around a body in which distances from it are evaluated; walls need them in neighbouring cells."""
 
 
-class Solid(Protocol):
+class SolidBody(Protocol):
     """A solid body.
 
     width : the smallest distance (m) between two opposite points of its surface, such as a diameter.
@@ -130,7 +130,7 @@ class Grid:
             for b, n in enumerate(self.shape)
         ]
 
-    def distances(self, component: int, solids: Sequence[Solid]) -> np.ndarray:
+    def distances(self, component: int, solids: Sequence[SolidBody]) -> np.ndarray:
         """Return the distances (m) of the faces with a component from the nearest surface, negative in
         bodies and walls, with the shape of the grid; a large distance far from all surfaces.
 
@@ -146,15 +146,15 @@ class Grid:
                 least[own] = np.minimum(least[own], solid.distances(points - images))
         return least
 
-    def _windows(self, component: int, solid: Solid) -> Iterator[tuple[tuple[slice, ...], np.ndarray]]:
+    def _windows(self, component: int, solid: SolidBody) -> Iterator[tuple[tuple[slice, ...], np.ndarray]]:
         """Yield the blocks of faces near a body and its periodic images, each with the shift (m) of the
         image."""
         low, high = solid.extent()
         blocks: list[list[tuple[slice, float]]] = []
         for b, n in enumerate(self.shape):
             offset = self.low[b] + (0.0 if b == component else 0.5 * self.spacing[b])
-            first = int(np.floor((low[b] - offset) / self.spacing[b])) - MARGIN
-            last = int(np.ceil((high[b] - offset) / self.spacing[b])) + MARGIN
+            first = int(np.floor((low[b] - offset) / self.spacing[b])) - WINDOW_CELLS
+            last = int(np.ceil((high[b] - offset) / self.spacing[b])) + WINDOW_CELLS
             turns = range(first // n, last // n + 1) if not self.walled[b] else range(1)
             ranges = [(max(first - k * n, 0), min(last - k * n, n - 1) + 1, k) for k in turns]
             blocks.append([(slice(i, j), -k * n * float(self.spacing[b])) for i, j, k in ranges if i < j])
@@ -164,7 +164,7 @@ class Grid:
     def _from_walls(self, places: list[np.ndarray]) -> np.ndarray:
         """Return the distances (m) from walls alone."""
         high = self.low + self.spacing * self.cells
-        least = np.full(self.shape, 4.0 * self.spacing.max() * MARGIN)
+        least = np.full(self.shape, 4.0 * self.spacing.max() * WINDOW_CELLS)
         if self.column == "tube":
             out = []
             for b in np.flatnonzero(self.walled):
