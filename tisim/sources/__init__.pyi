@@ -11,8 +11,8 @@ from .flow import (
 from .flow import (
     kozeny_carman as kozeny_carman,
 )
-from .magnetic.cylinder_body import Cylinder as Cylinder
 from .magnetic.cylinder import MagneticCylinders as MagneticCylinders
+from .magnetic.cylinder_body import Cylinder as Cylinder
 from .magnetic.magnets import Body as Body
 from .magnetic.magnets import Magnets as Magnets
 from .magnetic.mutual_magnetisation import magnetise as magnetise
