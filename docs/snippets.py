@@ -98,6 +98,8 @@ EFFECTS = {
     f" length=5e-3, magnetisation=(0, 0, 1e6))]), {SOFT}, Magnetophoresis()",
     "magnetic_field": "MagneticField(constant=(0.0, 0.0, 0.1)), Lorentz()",
     "magnetic_spheres": f"{MAGNET}, {SOFT}, Magnetophoresis()",
+    "pore_flow": "PoreFlow(low=(-5e-3, -5e-3, -5e-3), high=(5e-3, 5e-3, 5e-3), cells=(16, 16, 16), speed=1.0,"
+    f" viscosity=1e-3, spheres=[Sphere(centre=(0, 0, -3e-3), radius=1.5e-3)]), {DRAG}",
     "uniform_flow": f"UniformFlow(velocity=(1.0, 0.0, 0.0)), {DRAG}",
     "at_rest": "Gravity(), AtRest(time=2e-4)",
     "capture": "MagneticCylinders(cylinders=[Cylinder(centre=(0, 0, -1.5e-3), radius=1e-3,"
@@ -105,12 +107,15 @@ EFFECTS = {
     "compacted": "Compacted(low=(-5e-3, -5e-3, -5e-3), high=(5e-3, 5e-3, 5e-3), fraction=0.6, interval=1e-4)",
     "cooling": f"{HEATING}, Cooling(convection=10.0)",
     "fragmentation": f"{IMPACT}, Fragmentation(surface_energy=1e-4, grain_mass=1e-6)",
+    "inlet": "UniformFlow(velocity=(0.0, 0.0, 1.0)),"
+    " Inlet(low=(-5e-3, -5e-3, 0), high=(5e-3, 5e-3, 1e-4), direction=(0, 0, 1), end=5e-4)",
     "insertion_by_flux": f"InsertionByFlux({DRIFTING}, {GRAINS}, flux=0.1)",
     "insertion_by_fraction": f"InsertionByFraction({DRIFTING}, {GRAINS}, fraction=0.05, interval=1e-4)",
     "join_group": "PrescribedMotion(group=1),"
     " JoinGroup(group=1, planes=[Plane(point=(0, 0, 5e-5), normal=(0, 0, -1))], time=1e-4)",
     "mean_force": f"{CONTACT}, MeanForce(begin=1e-4)",
     "outflow": f"Outflow({PLATE})",
+    "outlet": f"Outlet({PLATE})",
     "passage": f"Passage({PLATE})",
     "peak_displacement": f"{CONTACT}, PeakDisplacement()",
     "peak_height": "Gravity(), PeakHeight(direction=(1.0, 0.0, 0.0))",
@@ -165,7 +170,7 @@ MEASURES = (
     "virial", "at_rest", "compacted", "insertion_by_flux", "insertion_by_fraction", "outflow", "passage",
     "peak_displacement",
 )  # fmt: skip
-COUNTERS = ("agglomeration", "impact", "capture", "fragmentation", "join_group")
+COUNTERS = ("agglomeration", "impact", "capture", "fragmentation", "inlet", "join_group", "outlet")
 """Parts whose temperatures, measures or counters are printed. For others it is moments or velocities."""
 QUANTITIES = {
     "temperature": "300.0", "charge": "1e-6", "saturation_moment": "1e-6", "domain_moment": "1e-18",

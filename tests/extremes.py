@@ -106,6 +106,15 @@ COMMON: dict[str, dict[str, Any]] = {
     "constriction_flow": {"speed": 1.0, "throat_radius": 1e-3, "duct_radius": 4e-3, "length": 2e-3},
     "softened_self_gravity": {"softening_length": 1e-4},
     "darcy_flow": {"pressure_gradient": [0.0, 0.0, 1e3], "viscosity": 1e-3, "diameter": 1e-3},
+    "pore_flow": {
+        "low": [-4e-3] * 3,
+        "high": [4e-3] * 3,
+        "speed": 1.0,
+        "viscosity": 1e-3,
+        "cells": [8, 8, 8],
+        "cylinders": [{"centre": [0, 0, -2e-3], "radius": 1e-3, "length": 3e-3}],
+        "spheres": [{"centre": [0, 2e-3, 2e-3], "radius": 1.5e-3}],
+    },
     "magnetic_field": {"constant": [0.0, 0.0, 0.1], "amplitude": [0.1, 0.0, 0.0], "omega": [1e3, 0.0, 0.0]},
     "electric_field": {"constant": [1e3, 0.0, 0.0], "amplitude": [0.0, 1e3, 0.0], "omega": [0.0, 1e3, 0.0]},
     "magnetic_spheres": {
@@ -127,6 +136,7 @@ COMMON: dict[str, dict[str, Any]] = {
     "ewald_langevin_moment": {"temperature": 300.0, **EWALD},
     "insertion_by_flux": {"low": [0.0, 0.0, 5e-3], "high": [0.02, 0.02, 0.02], "number": 3},
     "insertion_by_fraction": {"low": [0.0, 0.0, 0.02], "high": [0.02, 0.02, 0.04], "number": 3},
+    "inlet": {"low": [0.0, 0.0, 5e-3], "high": [0.02, 0.02, 6e-3], "end": 1e-4},
     "at_rest": {"time": 2e-4, "reference_acceleration": 9.81},
     "join_group": {"time": 1e-4},
     "mean_force": {"begin": 1e-4},

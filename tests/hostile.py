@@ -15,7 +15,7 @@ from tisim.components import serialization
 from tisim.components.component import Component
 from tisim.describe.explain import known_effects
 from tisim.effects import Confinement, Effect, HardBodies, HardRods
-from tisim.sources import MagneticField
+from tisim.sources import MagneticField, PoreFlow, UniformFlow
 from tisim.steppers import DriftLimit, FixedStep, Stepper
 
 
@@ -153,7 +153,7 @@ def with_needed(kind: type[Effect]) -> dict[str, Any]:
     for contract in kind.requires:
         partners |= with_needed(next(other for other in known_effects() if issubclass(other, contract)))
     if kind.requires_source:
-        partners |= with_needed(MagneticField)
+        partners |= with_needed(UniformFlow if "flow_velocity" in kind.requires_source else MagneticField)
     rows = {name: [_required(row)] for name, row in kind.lists()}
     return {**partners, kind.kind(): serialization.to_dict(kind(**_required(kind), **rows), named=False)}
 
@@ -171,7 +171,10 @@ def _required(kind: type[Component]) -> dict[str, Any]:
     options = {name: kind.model_fields[name] for name in others if kind.model_fields[name].is_required()}
     # The number of waves that the cut-off requires.
     more = {"waves": (12, 12, 12)} if "waves" in kind.model_fields else {}
-    return {**values, **{name: info.examples[0] for name, info in options.items() if info.examples}, **more}
+    # Either of two drives, and a grid that is solved in a moment.
+    drive = {"speed": 0.5, "cells": (16, 16, 16)} if kind is PoreFlow else {}
+    examples = {name: info.examples[0] for name, info in options.items() if info.examples}
+    return {**values, **examples, **more, **drive}
 
 
 def materials() -> dict[str, Any]:

@@ -45,7 +45,7 @@ SIZES = {
         {"number": 24, "hydrodynamics": "rotne-prager", "duration": 0.3, "coarse": 3.0},
     ),
     "paper": Size(
-        "500 of these, 1 s, as in B16; takes days",
+        "500 of these, 1 s, as in B16; takes hours",
         {"number": 500, "hydrodynamics": "rotne-prager", "duration": 1.0, "coarse": 3.0},
     ),
 }

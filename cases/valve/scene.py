@@ -22,7 +22,7 @@ from tisim.effects import CARBONYL_IRON, MutualInducedMoment, StokesDrag, Trunca
 from tisim.errors import must
 from tisim.scene.initial_state import Arrays
 from tisim.sources import MagneticField
-from tisim.sources.uniform import NO_END
+from tisim.sources.switched import NO_END
 from tisim.steppers import FixedStep, Verlet
 
 TITLE = "A magnetorheological valve: jam or flow by constriction, grain size and field"

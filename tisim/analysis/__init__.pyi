@@ -23,6 +23,13 @@ from .convex_hull import hull_volume as hull_volume
 from .discharge import beverloo_rate as beverloo_rate
 from .discharge import discharge_rate as discharge_rate
 from .discharge import discharge_rates as discharge_rates
+from .filtration import Balance as Balance
+from .filtration import BreakthroughCurve as BreakthroughCurve
+from .filtration import Fractions as Fractions
+from .filtration import breakthrough_curve as breakthrough_curve
+from .filtration import captured_by_size as captured_by_size
+from .filtration import mean_core_radius as mean_core_radius
+from .filtration import particle_balance as particle_balance
 from .flow_curves import BinghamFit as BinghamFit
 from .flow_curves import BiviscousFit as BiviscousFit
 from .flow_curves import Estimate as Estimate

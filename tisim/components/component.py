@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
 
@@ -212,7 +212,7 @@ class Component(Checked):
         """Return, by name, the nested parts that kernels access as ``self.NAME``; by default none."""
         return {}
 
-    def derived_rows(self) -> dict[str, list[float]]:
+    def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
         """Return, by name, rows of derived per-world numbers that a kernel reads as ``self.NAME(w, k)``; by
         default none. The length of each row is compiled in."""
         return {}

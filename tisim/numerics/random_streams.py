@@ -15,3 +15,9 @@ MOMENTS = 0x4D4F4D45
 """Stream of the moment directions of permanent magnets."""
 INSERTION = 0x494E5300
 """First of the streams of the insertion trials, one for each insertion by index in the scene."""
+CORE_MOMENTS = 0x434F5245
+"""Stream of the moments of the magnetic cores of grains of one size."""
+ADHESION = 0x41444800
+"""Stream of the choice of captured particles that adhere."""
+INLET = 0x494E4C00
+"""First of the streams of the entry times and places at inlets, one for each inlet by index in the scene."""

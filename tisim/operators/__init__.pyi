@@ -6,12 +6,15 @@ from .capture import Capture as Capture
 from .compacted import Compacted as Compacted
 from .cooling import Cooling as Cooling
 from .fragmentation import Fragmentation as Fragmentation
+from .inlet import Inlet as Inlet
 from .insertion import Insertion as Insertion
 from .insertion_rules import InsertionByFlux as InsertionByFlux
 from .insertion_rules import InsertionByFraction as InsertionByFraction
 from .join_group import JoinGroup as JoinGroup
 from .mean_force import MeanForce as MeanForce
 from .outflow import Outflow as Outflow
+from .outlet import Outlet as Outlet
 from .passage import Passage as Passage
 from .peak_displacement import PeakDisplacement as PeakDisplacement
 from .peak_height import PeakHeight as PeakHeight
+from .release import Release as Release

@@ -31,12 +31,16 @@ class Operator(Effect):
     any_order : whether the order of the particles in memory affects the result by rounding only; large worlds
     may then be sorted by place.
     terms : number of values per particle that are summed for ``world``.
+    acts_on_fixed : whether ``particle`` must also be called for particles whose field ``fixed`` is not 0, by
+    a stepper in which particles that do not interact take their own steps; they are then taken through the
+    longest steps. Other steppers call it for all particles.
     """
 
     contract: ClassVar[bool] = True
     homogeneous: ClassVar[bool] = False
     any_order: ClassVar[bool] = False
     terms: ClassVar[int] = 0
+    acts_on_fixed: ClassVar[bool] = False
 
     @classmethod
     def acts_on_worlds(cls) -> bool:

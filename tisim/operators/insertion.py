@@ -13,13 +13,14 @@ from tisim.components.component import Vector
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
 from tisim.numerics import philox
-from tisim.numerics.random_streams import INSERTION
+from tisim.numerics.random_streams import CORE_MOMENTS, INSERTION
 from tisim.numerics.vectors import random_orientation
 from tisim.operators.base import AddsParticles, option, parameter
 from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes
 from tisim.operators.tried_place import TriedPlace
-from tisim.packing.grains import check_quantities, class_materials, quantity
+from tisim.packing.grains import check_quantities, class_materials, further_quantities
+from tisim.packing.magnetic_core import core_moments
 from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
 from tisim.state.fields import WorldField
@@ -65,7 +66,9 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
 
     def structure(self) -> tuple[Any, ...]:
         """Return the compiled-in options, including sizes, materials and further quantities."""
-        classes = ((one.sizes, one.material, *sorted(one.quantities.items())) for one in self.grains)
+        classes = (
+            (one.sizes, one.material, one.core, *sorted(one.quantities.items())) for one in self.grains
+        )
         shapes = (table.tobytes() for table in GrainShapes.lookups(self).values())
         return (*super().structure(), *classes, *shapes)
 
@@ -95,8 +98,8 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
         }
 
     def inserted_quantities(self) -> Mapping[str, np.ndarray]:
-        every = np.arange(len(self.grains))
-        return {name: quantity(self.grains, name, every) for name in self.grains[0].quantities}
+        every, largest = np.arange(len(self.grains)), np.array(self.largest_spheres())
+        return further_quantities(self.grains, every, largest, np.zeros(len(every)))
 
     def capacity(self, masses: np.ndarray) -> int:
         return len(masses) + self.number * self.most_spheres()
@@ -111,6 +114,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
             "spans": np.column_stack([ends - lengths, ends - 1, by_number]).astype(float),
             # One more column, because there may be no given quantities.
             "given": np.array([np.hstack([*one.values(), 0.0]) for one in self.given_quantities()]),
+            "cores": np.array([one.core.row() if one.core else [0.0] * 4 for one in self.grains]),
         }
 
     def world_action(self, own: Bound[Any], s: State) -> WorldAction:
@@ -125,7 +129,20 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
             if hasattr(s, name):
                 given.append((getattr(s, name), first, np.size(value)))
             first += np.size(value)
-        own = {"inserted": number, "inserted_mass": mass, "given_fields": tuple(given)}
+        named = {*self.given_quantities()[0], *self.grains[0].quantity_names()}
+        own = {
+            "inserted": number,
+            "inserted_mass": mass,
+            "given_fields": tuple(given),
+            "has_cores": self.grains[0].core is not None,
+            "has_domains": "domain_moment" in self.grains[0].quantity_names(),
+            # Their defaults are copies of given fields, which an inserted particle gets last.
+            "copied_fields": tuple(
+                (getattr(s, field.name), getattr(s, field.default))
+                for field in s.fields
+                if field.default in named and field.name not in named
+            ),
+        }
         return {**super().bind_fields(s), **own}
 
     @ti.func
@@ -213,12 +230,22 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
 
     @ti.func
     def give(self, s, w, c, i):
-        """Set the further quantities that the class of a particle defines."""
+        """Set the further quantities that the class of a particle defines; those of its core, by its
+        radius."""
         for given in ti.static(self.given_fields):
             if ti.static(given[2] == 3):
                 given[0][w, i] = ti.Vector([self.given[c, given[1] + m] for m in range(3)])
             else:
                 given[0][w, i] = ti.cast(self.given[c, given[1]], given[0].dtype)
+        if ti.static(self.has_cores):
+            k = ti.cast(self.inserted[w], ti.i32)
+            normal = philox.normal(philox.bits(s.seed[w], CORE_MOMENTS, k, self.index))[0]
+            saturation, domain = core_moments(self.cores, c, s.radius[w, i], normal)
+            s.saturation_moment[w, i] = ti.cast(saturation, s.real)
+            if ti.static(self.has_domains):
+                s.domain_moment[w, i] = ti.cast(domain, s.real)
+        for copied in ti.static(self.copied_fields):
+            copied[0][w, i] = copied[1][w, i]
 
     @ti.func
     def draw_class(self, w, u):

@@ -2,6 +2,7 @@ from .around_cylinder import RandomAroundCylinder as RandomAroundCylinder
 from .clump import Clump as Clump
 from .grains import GrainClass as GrainClass
 from .in_duct import RandomInDuct as RandomInDuct
+from .magnetic_core import MagneticCore as MagneticCore
 from .placement import (
     Lattice as Lattice,
 )

@@ -10,10 +10,11 @@ from pydantic import model_validator
 
 from tisim.components.component import Component, Text, Vector, option, parameter
 from tisim.components.ranges import LEAST, MOST
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.materials.materials import Materials
 from tisim.numerics.random_streams import GRAIN_SIZES
 from tisim.packing.clump import Clump
+from tisim.packing.magnetic_core import MagneticCore
 from tisim.packing.size_laws import EqualSizes
 from tisim.packing.sizes import SizeDistribution
 
@@ -41,6 +42,9 @@ class GrainClass(Component):
     quantities: Mapping[Text, float | Vector] = option(
         "further fields of its grains by name, in SI, such as temperature", default_factory=dict
     )
+    core: MagneticCore | None = option(
+        "magnetic core of each grain, which gives it a saturation_moment by its own radius", None
+    )
 
     @classmethod
     def columns(cls) -> Iterator[tuple[str, int]]:
@@ -55,7 +59,13 @@ class GrainClass(Component):
         radius, rule = self.sizes.nodes()[0][[0, -1]], f"from {LEAST:g} to {MOST:g} kg"
         for mass in (self.density * 4 / 3 * np.pi * radius**3).tolist():
             must(LEAST <= mass <= MOST, "mass of a grain", rule, mass)
+        alone = self.core is None or self.clump is None
+        must(alone, f"{self.label}.core", "left out if there is a clump", Words("both"))
         return self
+
+    def quantity_names(self) -> list[str]:
+        """Return the names of the further fields of its grains, sorted."""
+        return sorted([*self.quantities, *(self.core.names() if self.core else ())])
 
     def spheres(self) -> np.ndarray:
         """Return the spheres of a grain of radius 1: position from the centre of mass along the principal
@@ -106,9 +116,25 @@ def masses(classes: Sequence[GrainClass], which: np.ndarray, radius: np.ndarray)
     return np.array([one.density for one in classes])[which] * 4 / 3 * np.pi * radius**3
 
 
-def quantity(classes: Sequence[GrainClass], name: str, which: np.ndarray) -> np.ndarray:
-    """Return a quantity given by all classes, for grains of these classes."""
-    return np.array([one.quantities[name] for one in classes], float)[which]
+def further_quantities(
+    classes: Sequence[GrainClass], which: np.ndarray, radius: np.ndarray, normal: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the further fields of grains of these classes and radii (m), by name; SI.
+
+    normal : the normal number Z of the magnetic core of each grain.
+    """
+    given = {
+        name: np.array([one.quantities[name] for one in classes], float)[which]
+        for name in sorted(classes[0].quantities)
+    }
+    if classes[0].core is None:
+        return given
+    moments = {name: np.empty(len(which)) for name in classes[0].core.names()}
+    for k, one in enumerate(classes):
+        assert one.core is not None
+        for name, values in one.core.moments(radius[which == k], normal[which == k]).items():
+            moments[name][which == k] = values
+    return {**given, **moments}
 
 
 def class_materials(
@@ -129,8 +155,15 @@ def check_quantities(classes: Sequence[GrainClass], taken: Collection[str]) -> N
     """Raise InputError unless all classes give the same quantities, with equal numbers of components, and
     none that is also given elsewhere."""
     for k, one in enumerate(classes):
-        names, where = sorted(one.quantities), f"grains.{k}.quantities"
-        must(names == sorted(classes[0].quantities), where, "those of the other classes", ", ".join(names))
+        where = f"grains.{k}.quantities"
+        names, others = (kind.quantity_names() for kind in (one, classes[0]))
+        must(names == others, where, "those of the other classes", ", ".join(names))
+        for name in one.core.names() if one.core else ():
+            rule = "given once, and none that the grains have"
+            must(name not in {*taken, *one.quantities}, f"grains.{k}.core", rule, name)
+        alike = (one.core is None) == (classes[0].core is None)
+        given = Words("none" if one.core is None else "given")
+        must(alike, f"grains.{k}.core", "given for all classes or for none", given)
         for name, value in one.quantities.items():
             must(name not in taken, f"{where}.{name}", "given once, and none that the grains have", value)
             components = np.size(classes[0].quantities[name])

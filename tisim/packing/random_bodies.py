@@ -126,7 +126,7 @@ def _is_free(
     z = np.array([0.0, 0.0, 1.0])
     axis = Rotation.from_quat(turn, scalar_first=True).apply(z)
     axes = Rotation.from_quat(turns[near], scalar_first=True).apply(z)
-    return bool((segment_distances(apart[near], axis, axes, half) >= 2 * radius).all())
+    return bool((segment_distances(apart[near], axis, axes, half, half) >= 2 * radius).all())
 
 
 def proved_apart(shape: ParticleShape, apart: np.ndarray, turn: Rotation, turns: Rotation) -> np.ndarray:
@@ -157,21 +157,23 @@ def proved_apart(shape: ParticleShape, apart: np.ndarray, turn: Rotation, turns:
     return proved
 
 
-def segment_distances(apart: np.ndarray, axis: np.ndarray, axes: np.ndarray, half: float) -> np.ndarray:
-    """Return the distances (m) of segments from a segment of the same length, shape (n,).
+def segment_distances(
+    apart: np.ndarray, axis: np.ndarray, axes: np.ndarray, half: float, halves: np.ndarray | float
+) -> np.ndarray:
+    """Return the distances (m) of segments from a segment, shape (n,).
 
     apart : their centres minus its centre (m, shape (n, 3)). axis, axes : unit vectors along it, shape (3,),
-    and along them, shape (n, 3). half : half the length (m).
+    and along them, shape (n, 3). half, halves : half its length and half their lengths (m).
 
     Source: C. Vega and S. Lago, Computers & Chemistry 18 (1994) 55.
     """
     b, along, other = axes @ axis, apart @ axis, np.einsum("ij,ij->i", apart, axes)
     square = 1 - b * b
     apart_ways = square > PARALLEL
-    beside = 0.5 * (np.maximum(-half, along - half) + np.minimum(half, along + half))
+    beside = 0.5 * (np.maximum(-half, along - halves) + np.minimum(half, along + halves))
     line = (along - b * other) / np.where(apart_ways, square, 1.0)
     on_it = np.clip(np.where(apart_ways, line, beside), -half, half)
-    on_them = np.clip(b * on_it - other, -half, half)
+    on_them = np.clip(b * on_it - other, -halves, halves)
     on_it = np.clip(along + b * on_them, -half, half)
     between = apart + on_them[:, None] * axes - on_it[:, None] * axis
     distances: np.ndarray = np.linalg.norm(between, axis=1)

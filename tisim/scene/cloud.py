@@ -18,9 +18,10 @@ from tisim.packing.grains import (
     check_quantities,
     class_materials,
     draw,
+    further_quantities,
     masses,
-    quantity,
 )
+from tisim.packing.magnetic_core import core_normals
 from tisim.packing.placement import Placement, RandomInDomain, RandomSequential
 from tisim.packing.tried_places import Packing
 from tisim.scene.initial_state import Arrays, Start, worst
@@ -156,8 +157,7 @@ class Cloud(Start):
         if mass is not None:
             return {"radius": np.full(n, self.radius), "mass": np.full(n, mass)}
         which, radius = draw(self.grains, n, seed)
-        names = self.grains[0].quantities
-        further = {name: quantity(self.grains, name, which) for name in names}
+        further = further_quantities(self.grains, which, radius, core_normals(n, seed))
         return {"radius": radius, "mass": masses(self.grains, which, radius), **further}
 
     def packing(self, domain: Domain, seed: int) -> Packing | None:

@@ -191,9 +191,11 @@ class Scene(Component):
         return *(part.structure() for part in parts), tuple(self.materials)
 
     def acting(self) -> tuple[Effect, ...]:
-        """Return the effects, completed by data of the initial state and the materials."""
+        """Return the effects, completed by data of the initial state, the materials and each other."""
         masses, materials = self.particles.masses(self.seed), Materials(self.materials, self.material_pairs)
-        return tuple(_of(effect, materials).at_start(masses) for effect in self.effects)
+        return tuple(
+            _of(effect, materials).at_start(masses).completed_by(self.effects) for effect in self.effects
+        )
 
     def start(self, seed: int | None = None) -> Arrays:
         """Return the initial quantities of the particles by name, for another seed if given."""

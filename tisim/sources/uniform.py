@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
 from tisim.effects.base import Effect
-from tisim.errors import must
 from tisim.numerics import elementary
-from tisim.sources.base import Source, parameter
+from tisim.sources.base import parameter
+from tisim.sources.switched import NO_END, Switched
 
 STILL: Vector = (0.0, 0.0, 0.0)
-NO_END = 1e30
-"""s, end of a field that is never switched off."""
 
 
-class Uniform(Source):
+class Uniform(Switched):
     """The contract of a field constant + amplitude sin(omega t + phase), each component by itself, between
     two times."""
 
@@ -32,27 +29,6 @@ class Uniform(Source):
         constant: Vector
         amplitude: Vector
         omega: Vector
-        begin: float
-        end: float
-
-    @model_validator(mode="after")
-    def _ends_after_it_begins(self) -> Uniform:
-        must(
-            self.end > self.begin,
-            f"{self.label}.end",
-            f"after {self.label}.begin, {self.begin:g} s",
-            self.end,
-        )
-        return self
-
-    @property
-    def kinked(self) -> bool:  # type: ignore[override]
-        """Return whether the field is switched on or off in the course of a run."""
-        return self.begin > 0 or self.end < NO_END
-
-    def structure(self) -> tuple[Any, ...]:
-        # Steppers may be compiled differently for forces with kinks.
-        return (*super().structure(), self.kinked)
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]
@@ -73,7 +49,7 @@ class Uniform(Source):
             amplitude, angle = self.amplitude(w), self.omega(w) * t + self.phase(w)
             for k in ti.static(range(3)):
                 value[k] += amplitude[k] * ti.cast(elementary.sin(angle[k]), float)
-        return ti.select(t >= self.begin(w) and t < self.end(w), 1.0, 0.0) * value
+        return ti.select(self.acts(w, t), 1.0, 0.0) * value
 
 
 class ElectricField(Uniform):

@@ -77,19 +77,20 @@ def _slots(part: Component) -> int:
     return _width(type(part)) + lists + derived + sum(_slots(one) for one in part.members().values())
 
 
-def _entries(part: Component, where: str) -> Iterator[tuple[str, float]]:
-    """Yield the values in the slots of a part, in order, each with its dotted name."""
-    names = [f"{where}.{name}" for name, size in part.columns() for _ in range(size)]
-    yield from zip(names, part.values(), strict=True)
+def _entries(part: Component, where: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the values in the slots of a part, in order, in blocks with one dotted name each."""
+    sizes = [size for _, size in part.columns()]
+    values = np.array(part.values(), float)
+    for (name, size), end in zip(part.columns(), np.cumsum(sizes), strict=True):
+        yield f"{where}.{name}", values[end - size : end]
     for name, kind in part.lists():
         rows = getattr(part, name)
-        yield f"{where}.{name}", float(len(rows))
+        yield f"{where}.{name}", np.array([float(len(rows))])
         for k, row in enumerate(rows):
             yield from _entries(row, f"{where}.{name}.{k}")
-        spare = _width(kind) * (kind.list_capacity(len(rows)) - len(rows))
-        yield from [(f"{where}.{name}", 0.0)] * spare
-    for name, values in part.derived_rows().items():
-        yield from ((f"{where}.{name}", value) for value in values)
+        yield f"{where}.{name}", np.zeros(_width(kind) * (kind.list_capacity(len(rows)) - len(rows)))
+    for name, derived in part.derived_rows().items():
+        yield f"{where}.{name}", np.asarray(derived, float)
     for name, member in part.members().items():
         yield from _entries(member, f"{where}.{name}")
 
@@ -151,14 +152,17 @@ class ParameterTable:
         """
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):
-            table[world, : self.slots] = [value for part in parts for _, value in _entries(part, part.label)]
+            blocks = [values for part in parts for _, values in _entries(part, part.label)]
+            table[world, : self.slots] = np.concatenate(blocks) if blocks else ()
         real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
         with np.errstate(over="ignore", under="ignore"):
             rounded = table.astype(real)
         flushed = (table != 0) & (np.abs(rounded) < np.finfo(real).tiny)
         for world, slot in np.argwhere(~np.isfinite(rounded) | flushed):
-            names = [name for part in rows[world] for name, _ in _entries(part, part.label)]
-            must(False, names[slot], f"within the range of {precision}", float(table[world, slot]))
+            entries = [entry for part in rows[world] for entry in _entries(part, part.label)]
+            ends = np.cumsum([len(values) for _, values in entries])
+            name = entries[int(np.searchsorted(ends, slot, side="right"))][0]
+            must(False, name, f"within the range of {precision}", float(table[world, slot]))
         self._put(rounded)
 
     @in_taichi_thread

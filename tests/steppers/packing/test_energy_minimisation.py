@@ -245,6 +245,21 @@ def test_a_run_that_ends_before_it_is_jammed_returns_its_last_accepted_configura
     assert result.measures["packing_fraction"] == pytest.approx(fraction(result, SPHERE), rel=1e-12)
 
 
+def test_a_world_ends_at_its_target():
+    """Bodies reach 0.4 and 0.45 without being jammed; the start of the third world is denser than its
+    target."""
+    made = [
+        scene(SPHERE, 100, packed, target=target) for packed, target in ((0.2, 0.4), (0.2, 0.45), (0.3, 0.25))
+    ]
+    for result, target in zip(run(made), (0.4, 0.45, 0.3), strict=True):
+        density, size = result.measures["packing_fraction"], result.state["radius"][0]
+        assert result.status.ok
+        assert density == pytest.approx(target, rel=1e-6)
+        assert density == pytest.approx(fraction(result, SPHERE), rel=1e-12)
+        assert (result.work["jammed"], result.measures["jammed_fraction"]) == (0, 0.0)
+        assert deepest(result.state, result.scene.domain.high[0], SPHERE, size) <= 1e-4 * RELATIVE
+
+
 def test_a_start_that_is_jammed_fails():
     result = run(scene(SPHERE, 100, 0.72))
     assert result.status.failed

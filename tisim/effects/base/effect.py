@@ -180,6 +180,11 @@ class Effect(Component):
         itself."""
         return self
 
+    def completed_by(self, effects: Sequence[Effect]) -> Self:
+        """Return a copy with values that follow from the other effects of its scene filled in; by default
+        itself."""
+        return self
+
     def given_at_start(self, start: Mapping[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
         """Return further fields of the particles of a start, given their quantities (SI) and the seed of the
         scene: arrays by field name, a row for each particle; by default none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -28,7 +28,7 @@ class HardBodies(Shaped, Pairwise):
     memory: ClassVar[int] = 0
     round_ends: ClassVar[bool] = False
 
-    def derived_rows(self) -> dict[str, list[float]]:
+    def derived_rows(self) -> dict[str, Sequence[float]]:
         return {**super().derived_rows(), "unit": [2 * float(self.shapes()[0].half_extents().min())]}
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:

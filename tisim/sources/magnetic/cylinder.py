@@ -2,116 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
-from pydantic import field_validator, model_validator
-from scipy.constants import mu_0
+from pydantic import model_validator
 
 from tisim.backend.taichi import ti
-from tisim.components.component import Vector
-from tisim.components.ranges import check_direction
-from tisim.effects.base import Effect, option, parameter
-from tisim.errors import InputError, must
-from tisim.geometry.cylinder import cylinder_distance
-from tisim.sources.magnetic import cylinder_field
+from tisim.effects.base import Effect, option
+from tisim.errors import must
+from tisim.sources.base import add_point
+from tisim.sources.magnetic.cell_sum import CellSum, cell_row
+from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
-from tisim.sources.magnetic.cylinder_frame import place, split_direction, split_magnetisation
 from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
-from tisim.sources.magnetic.magnets import Body, Magnets
+from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 
-
-class Cylinder(Body):
-    """A cylinder, magnetised uniformly in any direction, or not at all."""
-
-    axis: Vector = parameter("", "direction of the axis, of any nonzero length", (0.0, 0.0, 1.0))
-    radius: float = parameter("m", "radius R", examples=[3e-4], gt=0)
-    length: float = parameter("m", "length from end to end", examples=[1e-2], gt=0)
-
-    @field_validator("axis", mode="after")
-    @classmethod
-    def _direction(cls, axis: Vector) -> Vector:
-        check_direction("cylinder.axis", axis)
-        return axis
-
-    @property
-    def direction(self) -> Vector:
-        """Return the unit vector along the axis."""
-        (a, b, c), (u, v, w) = split_direction(self.axis)
-        return a + u, b + v, c + w
-
-    @classmethod
-    def columns(cls) -> Iterator[tuple[str, int]]:
-        """Yield the columns of the given parameters, and those that kernels read instead of axis and
-        magnetisation."""
-        yield from super().columns()
-        yield from (("lead", 3), ("rest", 3), ("across", 3), ("along", 1))
-
-    def values(self) -> list[float]:
-        lead, rest = split_direction(self.axis)
-        across, along = split_magnetisation(self.axis, self.magnetisation)
-        return [*super().values(), *lead, *rest, *across, along]
-
-    @ti.func
-    def place(self, w, k, r):
-        """Return the position of r (m) relative to cylinder k: distance from the axis, unit vector away from
-        the axis, coordinate along the axis from the centre, and distance beyond the nearer end, negative
-        before it."""
-        rho, outward, foot, z = place(r, self.centre(w, k), self.lead(w, k), self.rest(w, k))
-        side = ti.select(foot + z < 0.0, -1.0, 1.0)
-        return rho, outward, foot + z, (side * foot - 0.5 * self.length(w, k)) + side * z
-
-    @ti.func
-    def nearest(self, w, k, r):
-        rho, outward, z, end = self.place(w, k, r)
-        upward = ti.select(z < 0.0, -1.0, 1.0) * self.unit(w, k)
-        return cylinder_distance(rho, outward, end, upward, self.radius(w, k))
-
-    @ti.func
-    def unit(self, w, k):
-        """Return the unit vector along the axis."""
-        return self.lead(w, k) + self.rest(w, k)
-
-    @ti.func
-    def shape(self, w, k, rho, z, end):
-        """Return the six functions of ``cylinder_field``."""
-        return cylinder_field.shape(rho, z, end, self.radius(w, k), 0.5 * self.length(w, k), self.ends)
-
-    @ti.func
-    def flux_density(self, w, k, r):
-        rho, outward, z, end = self.place(w, k, r)
-        return self.density(w, k, self.shape(w, k, rho, z, end), rho, outward, end)
-
-    @ti.func
-    def flux(self, w, k, r):
-        rho, outward, z, end = self.place(w, k, r)
-        return self.flux_of(w, k, self.shape(w, k, rho, z, end), rho, outward, end)
-
-    @ti.func
-    def flux_mostly(self, w, k, r):
-        rho, outward, z, end = self.place(w, k, r)
-        half = 0.5 * self.length(w, k)
-        six, right = cylinder_field.mostly(rho, z, end, self.radius(w, k), half, self.ends)
-        b, slope = self.flux_of(w, k, six, rho, outward, end)
-        return b, slope, right
-
-    @ti.func
-    def flux_of(self, w, k, six, rho, outward, end):
-        """Return B (T) and its gradient (T/m), computed from the six functions."""
-        slope = cylinder_field.gradient(
-            six, rho, outward, self.unit(w, k), self.across(w, k), self.along(w, k)
-        )
-        return self.density(w, k, six, rho, outward, end), mu_0 * slope
-
-    @ti.func
-    def density(self, w, k, six, rho, outward, end):
-        """Return the flux density B = mu_0 (H + M) (T), M inside only."""
-        across, along = cylinder_field.field(six, rho, outward, self.across(w, k), self.along(w, k))
-        b = across + along * self.unit(w, k)
-        b += ti.select(rho < self.radius(w, k) and end < 0.0, self.magnetisation(w, k), 0.0)
-        return mu_0 * b
+MANY = 10
+"""Number of cylinders from which a sum by cells is tried as an approximation."""
 
 
 class MagneticCylinders(Magnets):
@@ -132,8 +41,15 @@ class MagneticCylinders(Magnets):
     the order of 1e-16 (length/R)^2, relative.
 
     The field jumps at the surface, and grows as a logarithm at the rims; the values returned there are
-    finite. With ``table_digits``, field and gradient are read from a table, which is made and whose error is
-    measured when a scene is compiled; cylinders must then be at least as long as their radius.
+    finite.
+
+    Two settings exchange accuracy for time; both errors are measured when a scene is compiled. With
+    ``table_digits``, field and gradient of each cylinder are read from a table; cylinders must then be at
+    least as long as their radius. With ``sum_digits``, only the cylinders near a place are added one by one,
+    and the others are summed in advance, as a harmonic polynomial in each cell of an octree. The octree is
+    twice as wide as the box about all cylinders; outside of it all cylinders are added one by one. The
+    largest error of the field, and of its gradient, is then below 10^-digits of its mean magnitude at random
+    places between the cylinders. Each world of a batch has its own octree.
 
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
@@ -145,6 +61,12 @@ class MagneticCylinders(Magnets):
         ge=2,
         le=6,
     )
+    sum_digits: int | None = option(
+        "digits of accuracy of the sum over the cylinders by cells; each cylinder is added unless given",
+        None,
+        ge=2,
+        le=5,
+    )
 
     @model_validator(mode="after")
     def _fit_for_a_table(self) -> Self:
@@ -154,17 +76,82 @@ class MagneticCylinders(Magnets):
         return self
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        if self.table_digits is not None:
+        if self.table_digits is not None or self.sum_digits is not None:
             return ()
-        try:
-            return tuple(type(self)(cylinders=self.cylinders, table_digits=digits) for digits in (3, 4, 5))
-        except InputError:
-            return ()
+        short = any(one.length < one.radius for one in self.cylinders)
+        by_table = () if short else (3, 4, 5)
+        by_cells = (3, 4, 5) if len(self.cylinders) >= MANY else ()
+        ways = [(table, None) for table in by_table]
+        for digits in by_cells:
+            ways += [(table, digits) for table in (digits, None) if table is None or by_table]
+        ways.sort(key=lambda way: way[1] or way[0] or 0)
+        return tuple(self.with_digits(*way) for way in ways)
+
+    def with_digits(self, table: int | None, cells: int | None) -> Self:
+        """Return a copy with other settings of accuracy."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**given, "table_digits": table, "sum_digits": cells})
 
     def lookups(self) -> dict[str, np.ndarray]:
-        return {} if self.table_digits is None else {"cells": table(self.table_digits)[0]}
+        return {} if self.table_digits is None else {"table": table(self.table_digits)[0]}
+
+    def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
+        own = {} if self.sum_digits is None else {"cells": cell_row(self.cylinders, self.sum_digits)}
+        return {**super().derived_rows(), **own}
 
     def connect(self, peers: Peers) -> dict[str, Any]:
-        bound, digits = peers.bound(self), self.table_digits
-        bound.cylinders.ends = ClosedEnds() if digits is None else TabulatedEnds(bound.cells, digits)
-        return super().connect(peers)
+        bound, digits, cells = peers.bound(self), self.table_digits, self.sum_digits
+        bound.cylinders.ends = ClosedEnds() if digits is None else TabulatedEnds(bound.table, digits)
+        capacity = Cylinder.list_capacity(len(self.cylinders))
+        in_cells = None if cells is None else CellSum(bound.cells, capacity, cells)
+        return {**super().connect(peers), "in_cells": in_cells, "has_cells": cells is not None}
+
+    @ti.func
+    def value(self, w, r, t):
+        b = 0.0 * r
+        if ti.static(not self.has_cells):
+            b = self.direct_value(w, r, t)
+        else:
+            b = self.by_cells(w, r, t, False)[0]
+        return b
+
+    @ti.func
+    def value_and_gradient(self, w, r, t):
+        b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
+        if ti.static(not self.has_cells):
+            b, gradient = self.direct(w, r, t)
+        else:
+            b, gradient = self.by_cells(w, r, t, True)
+        return b, gradient
+
+    @ti.func
+    def by_cells(self, w, r, t, slopes: ti.template()):  # type: ignore[valid-type]
+        """Return the field at r from the cell around it, and the gradient, 0 unless ``slopes``."""
+        b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
+        leaf, x, half = self.in_cells.leaf(w, r)
+        first, end, listed = 0, self.magnetised(w, t), False
+        if leaf >= 0 and end > 0:
+            begin, last = self.in_cells.near(w, leaf)
+            if last >= begin:
+                first, end, listed = begin, last, True
+                b, gradient = self.in_cells.distant(w, leaf, x, half, slopes)
+        for e in range(first, end):
+            k = e
+            if listed:
+                k = self.in_cells.index(w, e)
+            if ti.static(slopes):
+                one, slope = self.each.flux(w, k, r)
+                b += one
+                gradient += slope
+            else:
+                b += self.each.flux_density(w, k, r)
+        return b, gradient
+
+    @ti.func
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        if ti.static(not self.has_cells):
+            self.add_direct(w, r, t, value, gradient)
+        else:
+            for lane in range(ti.static(r[0].n)):
+                one, slope = self.value_and_gradient(w, ti.Vector([r[0][lane], r[1][lane], r[2][lane]]), t)
+                add_point(value, gradient, lane, one, slope)

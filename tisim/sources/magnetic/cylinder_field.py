@@ -71,6 +71,17 @@ def field(six, rho, outward, m_across, m_along):
 
 
 @ti.func
+def tensor(six, rho, outward, axis):
+    """Return W_ij, by which H_i = sum_j W_ij M_j; it is symmetric."""
+    bend = rho * (0.5 * six[2] * outward + six[3] * axis)
+    half = outward.outer_product(bend) + 0.5 * (six[0] - six[1]) * axis.outer_product(axis)
+    symmetric = half + half.transpose()
+    for i in ti.static(range(3)):
+        symmetric[i, i] += six[1]
+    return symmetric
+
+
+@ti.func
 def gradient(six, rho, outward, axis, m_across, m_along):
     """Return [i, k] dH_i / dr_k = sum_j W_ijk M_j, per unit of length; the matrix is symmetric and
     traceless."""

@@ -77,3 +77,13 @@ def place(r, centre, lead, rest):
     across = near - z * axis
     rho = across.norm()
     return rho, across / ti.select(rho > 0.0, rho, 1.0), foot, z
+
+
+@ti.func
+def relative_place(r, centre, lead, rest, half):
+    """Return the position of r (m) relative to a cylinder of length 2 ``half``: distance from the axis, unit
+    vector away from the axis, coordinate along the axis from the centre, and distance beyond the nearer end,
+    negative before it."""
+    rho, outward, foot, z = place(r, centre, lead, rest)
+    side = ti.select(foot + z < 0.0, -1.0, 1.0)
+    return rho, outward, foot + z, (side * foot - half) + side * z

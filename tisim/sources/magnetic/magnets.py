@@ -8,7 +8,8 @@ from scipy.constants import mu_0
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, Vector
-from tisim.sources.base import Source, add_point, parameter
+from tisim.sources.base import add_point, parameter
+from tisim.sources.switched import NO_END, Switched
 from tisim.state.bound import Peers
 
 
@@ -43,14 +44,18 @@ class Body(Component):
         return 0.0 * r, 0.0 * r.outer_product(r), False
 
 
-class Magnets(Source):
+class Magnets(Switched):
     """The contract of a source that sums the fields of a list of bodies, each with its given magnetisation;
-    bodies do not magnetise each other."""
+    bodies do not magnetise each other. They are magnetised from ``begin`` until ``end``, like soft magnets
+    without remanence in an applied field that is switched on and off."""
 
     contract: ClassVar[bool] = True
     quantity: ClassVar[str] = "magnetic_flux_density"
     each: ClassVar[Any]
     """The bodies, in the bound source."""
+
+    begin: float = parameter("s", "time from which on the bodies are magnetised", 0.0, ge=0)
+    end: float = parameter("s", "time at which the bodies lose their magnetisation", NO_END, gt=0)
 
     def bodies(self) -> Sequence[Any]:
         """Return the bodies of all lists."""
@@ -64,11 +69,16 @@ class Magnets(Source):
         return min((body.radius for body in self.bodies()), default=math.inf)
 
     @ti.func
+    def magnetised(self, w, t):
+        """Return the number of bodies that are magnetised at time t (s): all or none."""
+        number = self.each.size(w)
+        if ti.static(self.kinked):
+            number = ti.select(self.acts(w, t), number, 0)
+        return number
+
+    @ti.func
     def value(self, w, r, t):
-        b = 0.0 * r
-        for k in range(self.each.size(w)):
-            b += self.each.flux_density(w, k, r)
-        return b
+        return self.direct_value(w, r, t)
 
     @ti.func
     def gradient(self, w, r, t):
@@ -76,19 +86,37 @@ class Magnets(Source):
 
     @ti.func
     def value_and_gradient(self, w, r, t):
+        return self.direct(w, r, t)
+
+    @ti.func
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        self.add_direct(w, r, t, value, gradient)
+
+    @ti.func
+    def direct_value(self, w, r, t):
+        """Return the field at r (m), the sum over the bodies one by one."""
+        b = 0.0 * r
+        for k in range(self.magnetised(w, t)):
+            b += self.each.flux_density(w, k, r)
+        return b
+
+    @ti.func
+    def direct(self, w, r, t):
+        """Return the field at r (m) and its gradient, the sums over the bodies one by one."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        for k in range(self.each.size(w)):
+        for k in range(self.magnetised(w, t)):
             one, slope = self.each.flux(w, k, r)
             b += one
             gradient += slope
         return b, gradient
 
     @ti.func
-    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+    def add_direct(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        """Add the sums over the bodies one by one, at a tile of points (see ``add_tile``)."""
         # First the points for which the vectorised form is valid, then the others one by one; a tile of one
         # point has no vectors.
         size = ti.static(r[0].n)
-        for k in range(self.each.size(w)):
+        for k in range(self.magnetised(w, t)):
             left, wrong = ti.Vector([1] * size, ti.i32), size
             if ti.static(size > 1):
                 wrong = 0

@@ -48,6 +48,8 @@ class IndependentBrownianSteps(PerParticle):
         self.fluid = self.registers.with_registers(fluid)
         self.force_sum = self.registers.with_registers(context.force_sum)
         self.operators, self.forced = context.operators, context.forced
+        # Whether fixed particles may be freed: operators are then called for them after each interval.
+        self.wakes = any(operator.data.acts_on_fixed for operator in context.operators)
 
     @ti.func
     def run(self, w, i):
@@ -64,11 +66,16 @@ class IndependentBrownianSteps(PerParticle):
         attempt_limit, cut = s.attempt_limit[w], s.cut[w]
         while going > 0 and interval < end:
             kicks = [ti.Vector([0.0] * AHEAD, s.real) for _ in ti.static(range(3))]
-            for lane in range(AHEAD):
-                g = self.fluid.normals(w, i, self.number(interval + lane))
-                for k in ti.static(range(3)):
-                    kicks[k][lane] = g[k]
-            for lane in range(ti.min(AHEAD, ti.cast(end - interval, ti.i32))):
+            lanes = ti.min(AHEAD, ti.cast(end - interval, ti.i32))
+            if self.held(w, i) > 0:
+                # A fixed particle takes one interval, without noise, and may then be free.
+                lanes = 1
+            else:
+                for lane in range(AHEAD):
+                    g = self.fluid.normals(w, i, self.number(interval + lane))
+                    for k in ti.static(range(3)):
+                        kicks[k][lane] = g[k]
+            for lane in range(lanes):
                 if going > 0:
                     kick = ti.Vector([kicks[0][lane], kicks[1][lane], kicks[2][lane]])
                     elapsed, carry, steps, going, over = self.interval(
@@ -99,10 +106,22 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def able(self, w, i):
-        """Return 1 if a particle can still advance, else 0: it exists, can move, and has no fault."""
+        """Return 1 if a particle can still advance, else 0: it exists, has no fault, and can move or be
+        freed."""
         s = self.s
         there = s.mass[w, i] > 0.0 and s.own_fault[w, i] == 0
-        return ti.cast(there, ti.i32) * self.fluid.mobile(w, i)
+        able = ti.cast(there, ti.i32)
+        if ti.static(not self.wakes):
+            able *= self.fluid.mobile(w, i)
+        return able
+
+    @ti.func
+    def held(self, w, i):
+        """Return 1 for a fixed particle that an operator may free, else 0."""
+        held = 0
+        if ti.static(self.wakes):
+            held = 1 - self.fluid.mobile(w, i)
+        return held
 
     @ti.func
     def interval(self, w, i, interval, kick, start, rounding, before, most):
@@ -117,6 +136,14 @@ class IndependentBrownianSteps(PerParticle):
         elapsed, carry = start, rounding
         steps, going, g = before, 1, kick
         while elapsed < length and going > 0 and steps - before < most:
+            if self.held(w, i) > 0:
+                # It stays until the end of the interval.
+                self.end_step(w, i, begin + elapsed, length - elapsed)
+                if self.s.own_fault[w, i] == 0:
+                    elapsed = length
+                    steps += 1
+                going = self.able(w, i)
+                continue
             # An operator may have changed the radius in the last step.
             mobility = self.fluid.mobility(w, i)
             if ti.static(self.forced):
@@ -149,6 +176,13 @@ class IndependentBrownianSteps(PerParticle):
         s.velocity[w, i], s.position[w, i] = euler_step(
             s, self.fluid, w, i, mobility, push_velocity, t, step, g
         )
+        self.end_step(w, i, t, dt)
+
+    @ti.func
+    def end_step(self, w, i, t, dt):
+        """Call the operators for a particle after a step of dt (s) from t (s) on, and put it into the
+        domain."""
+        s, step = self.own, ti.cast(dt, self.s.real)
         for operator in ti.static(self.operators):
             operator.particle(s, w, i, t + dt, step)
         r = s.position[w, i]

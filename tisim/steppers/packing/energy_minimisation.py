@@ -49,6 +49,8 @@ FIRST_MIXING, LESS_MIXING, FASTER, SLOWER, DOWNHILL, SHORTEST = 0.25, 0.99, 1.1,
 of dt after a step uphill, and the shortest dt over the first one."""
 STALLED = 0.99
 """Energy after ``patience`` evaluations over the energy before, above which a configuration is jammed."""
+TARGET_ROUNDING = 1e-6
+"""A density that differs from the target by this part of it, by rounding, has reached it."""
 
 
 class EnergyMinimisation(PackingStepper):
@@ -68,9 +70,10 @@ class EnergyMinimisation(PackingStepper):
     contact forces, or if the energy does not fall by 1 % in ``patience`` evaluations. (Rods that lie side
     by side have no smooth energy, so their forces need not balance.) The world then returns to the last
     accepted configuration, and the density is bisected between the highest accepted and the lowest jammed
-    one, until they differ by less than ``precision``. A world ends in its last accepted configuration. The
-    measures ``packing_fraction`` and ``jammed_fraction`` of the result are both densities; the second one
-    is 0 if the run has ended before any configuration was jammed.
+    one, until they differ by less than ``precision``. A world ends in its last accepted configuration, or
+    as soon as an accepted one has the density ``target``. The measures ``packing_fraction`` and
+    ``jammed_fraction`` of the result are both densities; the second one is 0 if the run has ended before any
+    configuration was jammed.
 
     One step is one evaluation of the forces; it takes the time ``dt`` of the control, so the duration of a
     run is the largest number of evaluations. Overlaps of the start are removed first.
@@ -81,6 +84,9 @@ class EnergyMinimisation(PackingStepper):
 
     fraction_step: float = parameter(
         "", "increase of the packing fraction until it is bisected", 0.01, gt=0, le=0.1
+    )
+    target: float = parameter(
+        "", "packing fraction at which a world ends, unless it is jammed before", 1.0, gt=0, le=1
     )
     precision: float = parameter("", "difference of densities at which bisection ends", 1e-5, gt=0)
     tolerance: float = parameter("D", "overlap that is permitted", 1e-4, gt=0)
@@ -245,14 +251,17 @@ class MinimiseOrGrow(Phase):
 
     @ti.func
     def choose_density(self, w, last):
-        """Set the growth of the accepted configuration; end if its density is known to be the last one."""
+        """Set the growth of the accepted configuration; end if its density is the target, or is known to be
+        the last one."""
         s = self.s
         density, jammed = s.packing_fraction[w], s.jammed_fraction[w]
-        aim = density + ti.cast(self.stepper.fraction_step(w), ti.f64)
+        target = ti.cast(self.stepper.target(w), ti.f64)
+        aim = ti.min(density + ti.cast(self.stepper.fraction_step(w), ti.f64), target)
+        reached = density >= (1.0 - TARGET_ROUNDING) * target
         if jammed > 0.0:
             aim = 0.5 * (density + jammed)
             s.jammed[w] = ti.cast(jammed - density <= ti.cast(self.stepper.precision(w), ti.f64), ti.i64)
-        if last or s.jammed[w] == 1:
+        if last or reached or s.jammed[w] == 1:
             s.end[w] = s.time[w] + ti.cast(self.control.dt(w), ti.f64)
         elif density > 0.0:
             s.growth[w] = self.space.growth(aim, density)

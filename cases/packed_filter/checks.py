@@ -1,0 +1,123 @@
+"""Checks of packed_filter: what B16 expects of the matrix, and what single fibres predict for it."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from tisim import Result
+from tisim.analysis import Mean
+from tisim.cases.case import Check, Claim, Shown
+from tisim.cases.common.runs import grouped
+from tisim.cases.packed_filter.lone_fibre import lone_fibres
+from tisim.cases.packed_filter.measures import (
+    captured_by,
+    captured_fraction,
+    missing,
+    penetration,
+    released_fraction,
+)
+from tisim.cases.packed_filter.scene import MAGNETITE_SATURATION, PackedFilter, filter_of
+
+CHECK_STARTS = 6
+"""Packings of each setting, each with its own colloids."""
+LONE_FIBRES = 24
+"""Directions of single fibres."""
+WAITS = (10.0, 60.0, 180.0)
+"""Waiting times of static separation, s (B16 section 7.4.3)."""
+SLOW, FAST = 1e-4, 4e-4
+"""Superficial velocities of dynamic separation, of B16's ratio of 4 (section 7.4.2), m/s."""
+COLUMN = 0.28
+"""Length of B16's separation cell, m (section 7.3.2)."""
+COLLOIDS = 400
+
+
+def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
+    """Run static and dynamic separation in six packings each."""
+    still = filter_of("small", "static", duration=WAITS[-1], number=COLLOIDS)
+    rested = runs(still, starts)
+    yield from of_static(still, rested)
+    slow, fast = stream(SLOW), stream(FAST)
+    of_slow, of_fast = runs(slow, starts), runs(fast, starts)
+    yield from of_dynamic(slow, of_slow, of_fast)
+    yield from of_fibres(slow, of_slow, starts)
+    lost = missing([*rested, *of_slow, *of_fast])
+    yield Check("colloids that are neither out, captured nor free", float(lost), 0.0, 0.0)
+
+
+def stream(speed: float, size: str = "small", **settings: Any) -> PackedFilter:
+    """Return dynamic separation at a speed (m/s). At ``SLOW`` colloids enter for 40 s, and the field is
+    switched off after 200 s; in a faster flow all times are shorter in proportion."""
+    scale = SLOW / speed
+    times = {"feed": 40.0 * scale, "field_end": 200.0 * scale, "duration": 400.0 * scale}
+    return filter_of(size, speed=speed, **{"number": COLLOIDS, **times, **settings})
+
+
+def runs(filter: PackedFilter, starts: int) -> list[Result]:
+    """Return results in other packings with other colloids; RunError if a run fails."""
+    (results,) = grouped([filter.with_packing(seed).scene(seed) for seed in range(starts)], starts)
+    return results
+
+
+def of_static(filter: PackedFilter, results: Sequence[Result]) -> Iterator[Claim | Shown]:
+    """B16 7.4.3: half of the colloids are captured, the larger ones first."""
+    for wait in WAITS:
+        fraction = Mean.of([captured_fraction(one, wait) for one in results])
+        yield Shown(f"static: captured in {wait:g} s", fraction, "B16: 0.5 to 0.6 in 10 to 180 s")
+    size = {wait: np.array([free_radius(one, wait) for one in results]) for wait in (0.0, *WAITS)}
+    for wait in WAITS:
+        beside = "B16: about 3" if wait else "B16: 5.1"
+        yield Shown(f"static: mean radius of the free after {wait:g} s, nm", Mean.of(size[wait]), beside)
+    yield Claim(
+        "static: mean radius of the free after 180 s over the start", Mean.of(size[WAITS[-1]] / size[0.0]),
+        most=1.0,
+    )  # fmt: skip
+    lone, n = lone_fibres(filter, LONE_FIBRES), filter.matrix.density
+    for wait in WAITS:
+        free = Mean.of([1 - captured_fraction(one, wait) for one in results])
+        alone = lone.passed(wait, n)
+        yield Shown(f"static: free after {wait:g} s", free, f"single fibres: {alone}")
+
+
+def free_radius(result: Result, time: float) -> float:
+    """Return the mean magnetic radius of the colloids that are not captured by a time (s), nm."""
+    moment = result.state["saturation_moment"][~captured_by(result, time)]
+    return float(1e9 * np.cbrt(3 * moment / (4 * np.pi * MAGNETITE_SATURATION)).mean())
+
+
+def of_dynamic(
+    filter: PackedFilter, slow: Sequence[Result], fast: Sequence[Result]
+) -> Iterator[Claim | Shown]:
+    """B16 7.4.2: a flow four times as slow loses (nearly) no colloids; at most 60 % are released."""
+    depth = filter.matrix.depth
+    passing = [np.array([penetration(one) for one in some]) for some in (slow, fast)]
+    for name, some in zip(("slow", "4 times as fast"), passing, strict=True):
+        yield Shown(f"dynamic, {name}: passed in {1e3 * depth:.2g} mm", Mean.of(some))
+        whole = Mean.of(some ** (COLUMN / depth))
+        yield Shown(f"dynamic, {name}: passed in 28 cm", whole, "B16: (nearly) none; some")
+    yield Claim("dynamic: passed, fast minus slow", Mean.of(passing[1] - passing[0]), least=0.0)
+    freed = Mean.of([released_fraction(one) for one in slow])
+    yield Claim("dynamic: released after the field is switched off", freed, 0.4, 0.7)
+
+
+def of_fibres(filter: PackedFilter, results: Sequence[Result], starts: int) -> Iterator[Claim | Shown]:
+    """The matrix beside single fibres, the cascade, a uniform flow, and fibres that do not magnetise each
+    other."""
+    passing = np.array([penetration(one) for one in results])
+    matrix, lone = filter.matrix, lone_fibres(filter, LONE_FIBRES)
+    yield Shown(
+        "passed, matrix",
+        Mean.of(passing),
+        f"single fibres: {lone.passed(np.inf, matrix.density * matrix.depth)}",
+    )
+    still = lone_fibres(filter_of("small", "static", duration=filter.stage, number=COLLOIDS), LONE_FIBRES)
+    stages = matrix.depth * matrix.density ** (1 / 3)
+    yield Shown(
+        "passed, matrix", Mean.of(passing), f"cascade: {still.passed(np.inf, matrix.density, stages)}"
+    )
+    for name, setting in (
+        ("in a uniform flow", {"flow": "uniform"}),
+        ("without mutual magnetisation", {"mutual": False}),
+    ):
+        other = np.array([penetration(one) for one in runs(stream(SLOW, **setting), starts)])
+        yield Shown(f"passed, {name}, minus matrix", Mean.of(other - passing))

@@ -1,0 +1,57 @@
+"""Measures of a packed filter."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tisim import Result, Scene
+from tisim.accuracy import Quantity
+from tisim.analysis import particle_balance
+from tisim.sources import PoreFlow
+
+
+def inside(result: Result) -> np.ndarray:
+    """Return which colloids have entered the filter, shape (n,)."""
+    return np.asarray(result.state.get("entered_at", np.zeros(len(result.state["mass"]))) >= 0)
+
+
+def captured_by(result: Result, time: float = np.inf) -> np.ndarray:
+    """Return which colloids are captured, and were by a time (s), shape (n,)."""
+    at = result.state["captured_at"]
+    return np.asarray((at >= 0) & (at <= time))
+
+
+def captured_fraction(result: Result, time: float = np.inf) -> float:
+    """Return the fraction of the colloids that have entered which are captured, and were by a time (s)."""
+    return float(captured_by(result, time)[inside(result)].mean())
+
+
+def penetration(result: Result, which: np.ndarray | None = None) -> float:
+    """Return the fraction of the colloids, or of some of them, that are never captured: they have left, or
+    are free at the end. It is 1 if none has entered."""
+    count = result.state.get("capture_count", result.state["captured_by"] >= 0)
+    some = count[inside(result) if which is None else inside(result) & which]
+    return float((some == 0).mean()) if len(some) else 1.0
+
+
+def released_fraction(result: Result) -> float:
+    """Return the number of releases over the number of captures."""
+    return result.work["releases"] / result.work["captures"]
+
+
+def missing(results: Sequence[Result]) -> int:
+    """Return the largest number of colloids of a run that are neither out, captured nor free."""
+    return max(abs(particle_balance(one.work, one.state).missing) for one in results)
+
+
+def pressure_drop(result: Result) -> float:
+    """Return the pressure that drives the resolved flow through the matrix and the clear water around it,
+    Pa."""
+    flow = next(one for one in result.scene.effects if isinstance(one, PoreFlow))
+    assert flow.speed is not None
+    return flow.viscosity * flow.speed / flow.solve().permeability * (flow.high[2] - flow.low[2])
+
+
+def quantities(scene: Scene) -> tuple[Quantity, ...]:
+    """Return the quantity of ``tisim cost``: the captured fraction, as paths of colloids are random."""
+    return (Quantity("captured fraction", captured_fraction, random=True),)

@@ -1,0 +1,311 @@
+"""Magnetic colloids in a column packed with magnetised fibres: the filter of B16 chapter 7.
+
+A field along x magnetises fibres of soft steel, which are packed at random (matrix.py). Water flows along z.
+The colloids are single domains of magnetite of a lognormal distribution of sizes. They diffuse, and a colloid
+that touches a fibre is captured.
+
+"static" is B16's static separation: the colloids are spread at random in the pores, and nothing flows. The
+matrix and the positions of the colloids are periodic along all axes. "dynamic" is B16's dynamic separation: a
+suspension enters in front of the matrix, flows through it, and is counted behind it. The matrix is periodic
+across the flow. The field is the sum of the fields of all fibres within ``REACH`` of the matrix.
+
+B16 gives the field of about 1 and 1.5 T, the fibres, of 0.4 mm and 4, 7 and 11 mm, and the magnetic radius of
+the colloids. It does not give the solid fraction, the flow, or the hydrodynamic radius, which is here the
+magnetic one.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
+from typing import Any, Literal, Self
+
+import numpy as np
+from scipy.constants import Boltzmann
+from scipy.fft import next_fast_len
+
+from tisim import Box, Particles, Scene
+from tisim.cases.case import Size, size_named
+from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
+from tisim.cases.packed_filter.matrix import KEPT_MATRICES, Matrix
+from tisim.components.component import Vector
+from tisim.effects import Effect, LangevinMoment, Magnetophoresis
+from tisim.geometry import Plane
+from tisim.operators import Capture, Inlet, Outlet, Release
+from tisim.packing import GrainClass, LognormalSizes, MagneticCore
+from tisim.packing.grains import draw
+from tisim.packing.magnetic_core import core_normals
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow, UniformFlow, magnetise
+from tisim.sources.magnetic.soft_magnet import magnetisation
+from tisim.sources.switched import NO_END
+from tisim.steppers import Brownian, DriftLimit
+
+TITLE = "Magnetic colloids captured in a packing of magnetised fibres (B16)"
+STEEL_SATURATION = 2.2e6
+"""Saturation magnetisation of the fibres, A/m (B16 section 7.3.4)."""
+MAGNETITE_SATURATION = 4.46e5
+"""Saturation magnetisation of magnetite, A/m (B16 7.6)."""
+MAGNETITE_DENSITY = 5180.0
+"""Density of magnetite, kg/m^3."""
+MEAN_RADIUS, POLYDISPERSITY = 5.1e-9, 0.40
+"""Mean magnetic radius of the colloids, m, and their standard deviation over it (B16 section 7.4.1)."""
+SMALLEST_RADIUS, LARGEST_RADIUS = 1e-9, 20e-9
+"""Radii of the smallest and largest colloids, m."""
+REACH = 1.0
+"""Distance from the matrix up to which there are fibres, in lengths of a fibre."""
+LONGEST_MOVE = 0.05
+"""Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D."""
+TABLE_DIGITS = 3
+"""Number of digits of the field; random motion outweighs this error."""
+APPROACH = 1.0
+"""Distance of the faces at which colloids enter and leave from the matrix, in lengths of a fibre."""
+ALONG: Vector = (0.0, 0.0, 1.0)
+"""Direction of the flow."""
+ADHERING = 0.4
+"""Fraction of captured colloids that are never released: B16 released at most 60 % (section 7.5)."""
+MATRIX_SETTINGS = tuple(one.name for one in fields(Matrix))
+CLEAR = 1.001
+"""Colloids start outside the fibres, enlarged by this factor."""
+Mode = Literal["static", "dynamic"]
+
+SEARCH: dict[str, Any] = {"options": {"population": 12}, "ensemble": {"confirm": 8}}
+"""Settings of searches of every size."""
+SIZES = {
+    "small": Size(
+        "25 fibres of L/D = 2 and 200 colloids, which enter for 40 s; the field is switched off at 150 s",
+        {"aspect": 2.0, "number": 200, "feed": 40.0, "field_end": 150.0, "duration": 300.0},
+        {"generations": 8, "max_evaluations": 80, **SEARCH},
+    ),
+    "default": Size(
+        "95 fibres of L/D = 5 and 1000 colloids, which enter for 60 s; the field is switched off at 300 s",
+        {"aspect": 5.0, "number": 1000, "feed": 60.0, "field_end": 300.0, "duration": 600.0},
+        {"generations": 20, "max_evaluations": 240, **SEARCH},
+    ),
+    "large": Size(
+        "438 fibres of L/D = 10, as B16's of 4 mm, and 10,000 colloids",
+        {"aspect": 10.0, "fraction": 0.3, "number": 10_000, "feed": 120.0, "field_end": 600.0}
+        | {"duration": 1200.0},
+    ),
+}
+
+
+@dataclass(frozen=True)
+class PackedFilter:
+    """A filter and the suspension in it.
+
+    matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
+    magnetise each other. speed : superficial velocity of the water, the volume flow over the cross section of
+    the column, m/s. flow : "resolved" between the fibres, or "uniform" with the mean velocity in the pores.
+    resolution : cells of the resolved flow over D. feed : time until which colloids enter, s. field_end :
+    time at which the field is switched off, s. adhering : fraction of captured colloids that are never
+    released; None for captures that last for ever. mean_radius, polydispersity : of the colloids, m, and
+    relative. number : of colloids. duration : of the run, s.
+    """
+
+    matrix: Matrix = field(default_factory=Matrix)
+    mode: Mode = "static"
+    flux: float = 1.0
+    mutual: bool = True
+    speed: float = 1e-4
+    flow: Literal["resolved", "uniform"] = "resolved"
+    resolution: float = 5.0
+    feed: float = 60.0
+    field_end: float = NO_END
+    adhering: float | None = None
+    mean_radius: float = MEAN_RADIUS
+    polydispersity: float = POLYDISPERSITY
+    number: int = 1000
+    duration: float = 60.0
+
+    @property
+    def pore_speed(self) -> float:
+        """Return the mean velocity of the water in the pores, m/s."""
+        return self.speed / (1 - self.matrix.fraction)
+
+    @property
+    def stage(self) -> float:
+        """Return the time in which the water passes the mean distance of fibres, s."""
+        return self.matrix.density ** (-1 / 3) / self.pore_speed
+
+    def with_packing(self, seed: int) -> Self:
+        """Return the filter with the packing of a seed."""
+        return replace(self, matrix=replace(self.matrix, seed=seed))
+
+    def grains(self) -> GrainClass:
+        """Return the distribution of the colloids."""
+        variance = np.log1p(self.polydispersity**2)
+        sizes = LognormalSizes(
+            by="number",
+            median=self.mean_radius * float(np.exp(-variance / 2)),
+            ratio=float(np.exp(np.sqrt(variance))),
+            smallest=SMALLEST_RADIUS,
+            largest=LARGEST_RADIUS,
+        )
+        core = MagneticCore(magnetisation=MAGNETITE_SATURATION)
+        return GrainClass(sizes=sizes, density=MAGNETITE_DENSITY, core=core)
+
+    def field(self) -> Vector:
+        """Return the flux density of the applied field, T."""
+        return self.flux, 0.0, 0.0
+
+    def magnets(self) -> tuple[Cylinder, ...]:
+        """Return the magnetised fibres: those of the matrix, and after them their images."""
+        return _magnets(self.matrix, self.field(), self.mode == "static", self.mutual)
+
+    def box(self) -> Box:
+        """Return the box of the matrix."""
+        half, along = self.matrix.side / 2, self.mode == "static"
+        return Box(
+            low=(-half, -half, 0.0),
+            high=(half, half, self.matrix.depth),
+            periodic=(True, True, along),
+            images=False,
+        )
+
+    def scene(self, seed: int) -> Scene:
+        """Return the scene of a seed."""
+        return self.scene_about(self.matrix.fibres(), self.magnets(), self.box(), seed)
+
+    def scene_about(
+        self, fibres: tuple[Cylinder, ...], magnets: tuple[Cylinder, ...], box: Box, seed: int
+    ) -> Scene:
+        """Return the scene of other fibres in another box. magnets : the fibres and their images."""
+        core = self.grains().core
+        assert core is not None
+        _, radius = draw([self.grains()], self.number, seed)
+        moments = core.moments(radius, core_normals(self.number, seed))["saturation_moment"]
+        return Scene(
+            name="packed_filter",
+            particles=Particles(
+                position=in_pores(self.number, magnets, box, seed),
+                velocity=np.zeros((self.number, 3)),
+                radius=radius,
+                density=MAGNETITE_DENSITY,
+                quantities={"saturation_moment": moments, "domain_moment": moments},
+            ),
+            domain=box,
+            effects=(
+                MagneticField(constant=self.field(), end=self.field_end),
+                MagneticCylinders(cylinders=magnets, table_digits=TABLE_DIGITS, end=self.field_end),
+                LangevinMoment(temperature=WATER_TEMPERATURE),
+                Magnetophoresis(),
+                Capture(release=self.release()),
+                *self.stream(fibres, box),
+            ),
+            stepper=self.stepper(),
+            duration=self.duration,
+            seed=seed,
+        )
+
+    def stream(self, fibres: tuple[Cylinder, ...], box: Box) -> tuple[Effect, ...]:
+        """Return the flow, and the faces before and behind a box at which colloids enter and leave."""
+        if self.mode == "static":
+            return ()
+        before = APPROACH * self.matrix.length
+        (left, front, bottom), (right, back, top) = box.low, box.high
+        first, entry, last = bottom - before - self.matrix.diameter, bottom - before, top + before
+        flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed))
+        if self.flow == "resolved":
+            size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
+            x, y, z = (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
+            flow = PoreFlow(
+                low=(left, front, first),
+                high=(right, back, last),
+                speed=self.speed,
+                viscosity=WATER_VISCOSITY,
+                cylinders=fibres,
+                cells=(x, y, z),
+            )
+        return (
+            flow,
+            Inlet(low=(left, front, first), high=(right, back, entry), direction=ALONG, end=self.feed),
+            Outlet(planes=(Plane(point=(0.0, 0.0, last), normal=(0.0, 0.0, -1.0)),)),
+        )
+
+    def release(self) -> Release | None:
+        """Return the conditions under which captured colloids are released."""
+        if self.adhering is None:
+            return None
+        return Release(adhering=self.adhering, temperature=WATER_TEMPERATURE)
+
+    def stepper(self) -> Brownian:
+        """Return the stepper, whose steps move a colloid by at most LONGEST_MOVE."""
+        move = LONGEST_MOVE * self.matrix.diameter
+        diffusion = Boltzmann * WATER_TEMPERATURE / (6 * np.pi * WATER_VISCOSITY * self.mean_radius)
+        longest = min(move**2 / (2 * diffusion), move / self.pore_speed if self.mode == "dynamic" else np.inf)
+        return Brownian(
+            temperature=WATER_TEMPERATURE,
+            viscosity=WATER_VISCOSITY,
+            control=DriftLimit(longest=longest, shortest=1e-6, drift=move / self.mean_radius),
+        )
+
+
+def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int) -> np.ndarray:
+    """Return random positions in a box outside the fibres, m, shape (number, 3)."""
+    generator = np.random.default_rng([seed, 0x904E5])
+    centre, axis = (np.array([getattr(one, name) for one in fibres]) for name in ("centre", "direction"))
+    radius, half = np.array([(one.radius, one.length / 2) for one in fibres]).T * CLEAR
+    found = np.empty((0, 3))
+    while len(found) < number:
+        tried = generator.uniform(box.low, box.high, (number, 3))
+        inside = np.zeros(number, bool)
+        for k in range(len(fibres)):
+            away = tried - centre[k]
+            along = away @ axis[k]
+            across = np.linalg.norm(away - along[:, None] * axis[k], axis=1)
+            inside |= (across < radius[k]) & (np.abs(along) < half[k])
+        found = np.concatenate([found, tried[~inside]])
+    return found[:number]
+
+
+@lru_cache(KEPT_MATRICES)
+def _magnets(matrix: Matrix, flux: Vector, bulk: bool, mutual: bool) -> tuple[Cylinder, ...]:
+    fibres = matrix.fibres()
+    every = matrix.with_images(fibres, REACH * matrix.length, bulk)
+    if mutual:
+        own = magnetise(every, flux, STEEL_SATURATION, math.inf)[: len(fibres)]
+    else:
+        own = tuple(magnetised(one, flux) for one in fibres)
+    # The outermost images lack neighbours; all images are magnetised as their fibres.
+    return matrix.with_images(own, REACH * matrix.length, bulk)
+
+
+def magnetised(body: Cylinder, flux: Vector) -> Cylinder:
+    """Return a fibre of soft steel in a field (T)."""
+    m = magnetisation(body.axis, body.radius, body.length, STEEL_SATURATION, flux)
+    return body.model_copy(update={"magnetisation": m})
+
+
+def filter_of(size: str, mode: Mode = "dynamic", seed: int = 0, **settings: Any) -> PackedFilter:
+    """Return the filter of a size. seed : of its matrix. settings : of Matrix and PackedFilter; they override
+    the size."""
+    wanted = {**size_named(size, SIZES).scene, **settings, "seed": seed}
+    matrix = Matrix(**{name: wanted.pop(name) for name in MATRIX_SETTINGS if name in wanted})
+    if mode == "static":
+        wanted |= {"field_end": NO_END}
+    else:
+        wanted = {"adhering": ADHERING, **wanted}
+    return PackedFilter(matrix, mode, **wanted)
+
+
+def scene_for(size: str, seed: int) -> Scene:
+    """Return dynamic separation of a size, with the packing, the colloids and the noise of a seed."""
+    return filter_of(size, seed=seed).scene(seed)
+
+
+def static_scene(size: str, seed: int) -> Scene:
+    """Return static separation of a size, from the start of a seed."""
+    return filter_of(size, "static", seed).scene(seed)
+
+
+def uniform_scene(size: str, seed: int) -> Scene:
+    """Return dynamic separation in a uniform flow."""
+    return filter_of(size, seed=seed, flow="uniform").scene(seed)
+
+
+PACKED_FILTER_SCENES: Mapping[str, Callable[[str, int], Scene]] = {
+    "dynamic": scene_for,
+    "static": static_scene,
+    "uniform-flow": uniform_scene,
+}
+"""Scenes of ``tisim run packed_filter --variant``."""

@@ -1,0 +1,305 @@
+"""The flow of a fluid through a matrix of fibres and spheres, as a source that drag laws use."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import field_validator, model_validator
+
+from tisim.backend.taichi import ti
+from tisim.compiling import compiling
+from tisim.components.component import Vector
+from tisim.components.ranges import check_direction
+from tisim.effects.base import SceneParts
+from tisim.errors import Words, must
+from tisim.sources.base import Source, option, parameter
+from tisim.sources.magnetic.cylinder import Cylinder
+from tisim.sources.magnetic.sphere import Sphere
+from tisim.sources.pore_flow.solids import Column, Grid, SolidBody, SolidCylinder, SolidSphere
+from tisim.sources.pore_flow.stokes_flow import TOLERANCE, TOLERANCES, stokes_flow
+
+AXIS_NAMES = ("x", "y", "z")
+KEPT_BYTES = 500_000_000
+"""Memory of solved flows that are kept for later scenes of the process, at least one of them."""
+WHOLE_PERIODS = 1e-9
+"""Relative rounding of the number of periods of the flow in a domain."""
+
+
+class UnitFlow(NamedTuple):
+    """A flow with a superficial velocity of 1 along its pressure gradient.
+
+    velocity : on faces, shape (3, nx, ny, nz). mean : superficial velocity, shape (3,). permeability : m^2.
+    """
+
+    velocity: np.ndarray
+    mean: np.ndarray
+    permeability: float
+
+
+_solved: OrderedDict[tuple[Any, ...], UnitFlow] = OrderedDict()
+
+
+class PoreFlow(Source):
+    """A pressure gradient drives a viscous fluid slowly between fibres and spheres at rest; drag laws use its
+    velocity.
+
+        eta Lap v - grad p = 0,    div v = 0,    v = 0 on bodies and walls
+
+    The equations are solved once for each matrix, when a scene is compiled, on a grid of ``cells`` over the
+    box; see ``stokes_flow``. The velocity is proportional to the pressure gradient, or to the superficial
+    velocity: scenes that differ in these only share a solution. The pore Reynolds number must be far below 1.
+
+    Between the faces of the grid, quadratic splines along a component and linear ones across it give a
+    continuous velocity without divergence, so that a fluid with uniform density remains so. It vanishes
+    inside bodies, but only within a cell from their surface; at the surface itself it is of first order in
+    the spacing. Particles that are captured on contact should therefore be larger than a cell, or cells be
+    smaller than the layer around a body in which particles are captured.
+
+    The matrix continues periodically across the faces of the box, as do bodies that cross them. A flow with
+    ``outside = "uniform"`` belongs to a filter in free space: outside of the box the fluid has the
+    superficial velocity everywhere, and layers of the box without bodies keep the jump at its faces small.
+
+    With ``column``, the faces of the box around ``axis`` are walls: of a duct, or of a round tube that
+    touches them. The velocity is 0 in walls and beyond.
+
+    Source: B16 section 7.2.2 (Darcy's law); O. Filippova, D. Haenel, ...
+    """
+
+    quantity = "flow_velocity"
+    kinked: ClassVar[bool] = True
+
+    low: Vector = parameter("m", "lower corner of the box of the matrix", examples=[(-5e-4, -5e-4, -5e-4)])
+    high: Vector = parameter("m", "upper corner of the box", examples=[(5e-4, 5e-4, 5e-4)])
+    direction: Vector = parameter(
+        "",
+        "direction of the driving force, opposite to the pressure gradient; of any length",
+        (0.0, 0.0, 1.0),
+    )
+    pressure_gradient: float | None = parameter(
+        "Pa/m", "magnitude of the mean pressure gradient, unless the speed is given", None, ge=0
+    )
+    speed: float | None = parameter(
+        "m/s",
+        "component of the superficial velocity along the direction, unless the pressure gradient is given",
+        None,
+        ge=0,
+        examples=[1e-3],
+    )
+    viscosity: float = parameter("Pa s", "dynamic viscosity eta of the fluid", examples=[1e-3], gt=0)
+    cylinders: tuple[Cylinder, ...] = option(
+        "the fibres; worlds of a batch may have different ones",
+        (),
+        examples=[(Cylinder(radius=1e-4, length=5e-4),)],
+    )
+    spheres: tuple[Sphere, ...] = option("spheres; worlds may have different ones", (), examples=[()])
+    cells: tuple[int, int, int] = option("cells of the grid along x, y and z", (64, 64, 64))
+    column: Column = option("walls around the matrix: none, a rectangular duct or a round tube", "none")
+    axis: Literal["x", "y", "z"] = option("axis along which a duct or a tube is open", "z")
+    outside: Literal["periodic", "uniform"] = option(
+        "velocity outside of the box: of its periodic images, or the superficial velocity", "periodic"
+    )
+    tolerance: float = option(
+        "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
+    )
+
+    if TYPE_CHECKING:
+        grid: ClassVar[Any]
+        mean: ClassVar[Any]
+        scale: ClassVar[Any]
+
+    @field_validator("direction", mode="after")
+    @classmethod
+    def _direction(cls, direction: Vector) -> Vector:
+        check_direction("pore_flow.direction", direction)
+        return direction
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        label, given = self.label, (self.pressure_gradient is not None) + (self.speed is not None)
+        rule = f"given, or {label}.speed, and not both"
+        must(given == 1, f"{label}.pressure_gradient", rule, Words("both" if given else "neither"))
+        ordered = all(a < b for a, b in zip(self.low, self.high, strict=True))
+        must(ordered, f"{label}.high", f"above {label}.low in every component", self.high)
+        must(min(self.cells) >= 1, f"{label}.cells", "whole numbers, at least 1", self.cells)
+        free = self.column == "none"
+        some = bool(self.cylinders or self.spheres) or not free
+        rule = "given, or spheres, or a column with walls"
+        must(some, f"{label}.cylinders", rule, Words("none of them"))
+        must(free or self.outside == "periodic", f"{label}.outside", "'periodic' with a column", self.outside)
+        across = [c for a, c in zip(AXIS_NAMES, self.direction, strict=True) if a != self.axis]
+        along = free or not any(across)
+        must(along, f"{label}.direction", f"along the {self.column}, {self.axis}", self.direction)
+        return self
+
+    def values(self) -> list[float]:
+        # Kernels read the derived ``scale`` in place of the one that is given.
+        given = {"pressure_gradient": self.pressure_gradient or 0.0, "speed": self.speed or 0.0}
+        return super(PoreFlow, self.model_copy(update=given)).values()
+
+    def solids(self) -> list[SolidBody]:
+        """Return the bodies of the matrix."""
+        return [
+            *(SolidCylinder(one.centre, one.direction, one.radius, one.length) for one in self.cylinders),
+            *(SolidSphere(one.centre, one.radius) for one in self.spheres),
+        ]
+
+    def solve(self) -> UnitFlow:
+        """Return the flow for a superficial velocity of 1 along the direction; solved once in a process for
+        each matrix. InputError if the fluid cannot pass."""
+        n = np.array(self.direction) / np.abs(self.direction).max()
+        n /= np.linalg.norm(n)
+        solids = self.solids()
+        box = (self.low, self.high, self.cells, self.column, self.axis)
+        key = (tuple(solids), *box, tuple(n.tolist()), self.tolerance)
+        if key not in _solved:
+            with compiling():
+                flow = stokes_flow(
+                    solids, self.low, self.high, self.cells, (-n).tolist(), 1.0, self.column,
+                    AXIS_NAMES.index(self.axis), self.tolerance,
+                )  # fmt: skip
+            along = float(flow.mean_velocity @ n)
+            velocity = flow.velocity / along
+            # Tiny numbers could not be stored in f32.
+            velocity[np.abs(velocity) < 1e-30] = 0.0
+            _solved[key] = UnitFlow(velocity, flow.mean_velocity / along, flow.permeability)
+        _solved.move_to_end(key)
+        while len(_solved) > 1 and sum(one.velocity.nbytes for one in _solved.values()) > KEPT_BYTES:
+            _solved.popitem(last=False)
+        return _solved[key]
+
+    def superficial_speed(self) -> float:
+        """Return the component of the superficial velocity along the direction (m/s)."""
+        if self.speed is not None:
+            return self.speed
+        return self.solve().permeability * (self.pressure_gradient or 0.0) / self.viscosity
+
+    def permeability(self) -> float:
+        """Return the permeability along the direction (m^2)."""
+        return self.solve().permeability
+
+    def strongest(self) -> float:
+        largest = np.abs(self.solve().velocity).max(axis=(1, 2, 3))
+        return float(np.linalg.norm(largest) * self.superficial_speed())
+
+    def shortest_length(self) -> float:
+        sides = np.subtract(self.high, self.low) / self.cells
+        return float(sides[np.array(self.cells) > 1].min(initial=max(sides)))
+
+    def check(self, scene: SceneParts) -> None:
+        super().check(scene)
+        low, high = scene.domain.bounds()
+        if self.outside != "periodic" or low is None or high is None:
+            return
+        periods = (high - low) / np.subtract(self.high, self.low)
+        for axis, joined, number in zip(AXIS_NAMES, scene.domain.joined(), periods, strict=True):
+            fits = not joined or abs(number / max(round(number), 1) - 1) < WHOLE_PERIODS
+            rule = f"a whole part of the side of the periodic domain along {axis}"
+            must(fits, f"the box of {self.label}", rule, Words(f"{1 / number:g} of it"))
+
+    def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
+        flow = self.solve()
+        return {"grid": flow.velocity.ravel(), "mean": flow.mean, "scale": [self.superficial_speed()]}
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Return the cells of the grid along each axis, with cells inside walls."""
+        return self._grid.shape
+
+    @property
+    def walled(self) -> tuple[bool, bool, bool]:
+        """Return the axes along which the box has walls."""
+        return self._grid.walled
+
+    @property
+    def _grid(self) -> Grid:
+        spacing = np.subtract(self.high, self.low) / self.cells
+        return Grid(np.array(self.low), spacing, self.cells, self.column, AXIS_NAMES.index(self.axis))
+
+    @ti.func
+    def value(self, w, r, t):
+        return self.interpolate(w, r)[0]
+
+    @ti.func
+    def gradient(self, w, r, t):
+        return self.interpolate(w, r)[1]
+
+    @ti.func
+    def value_and_gradient(self, w, r, t):
+        return self.interpolate(w, r)
+
+    @ti.func
+    def interpolate(self, w, r):
+        """Return velocity (m/s) and gradient (1/s) at r (m)."""
+        place, inside, per = self.place(w, r)
+        v, slope = 0.0 * r, 0.0 * r.outer_product(r)
+        for a in ti.static(range(3)):
+            first, weight, change = self.splines(place, a)
+            for i in range(ti.static(3 if a == 0 else 2)):
+                x = self.wrapped(first[0] + i, 0)
+                for j in range(ti.static(3 if a == 1 else 2)):
+                    y = self.wrapped(first[1] + j, 1)
+                    for k in range(ti.static(3 if a == 2 else 2)):
+                        z = self.wrapped(first[2] + k, 2)
+                        n = ti.static(self.shape)
+                        u = self.grid(w, ((a * n[0] + x) * n[1] + y) * n[2] + z)
+                        v[a] += u * weight[0, i] * weight[1, j] * weight[2, k]
+                        slope[a, 0] += u * change[0, i] * weight[1, j] * weight[2, k]
+                        slope[a, 1] += u * weight[0, i] * change[1, j] * weight[2, k]
+                        slope[a, 2] += u * weight[0, i] * weight[1, j] * change[2, k]
+            for b in ti.static(range(3)):
+                slope[a, b] *= ti.select(inside, self.scale(w, 0) * per[b], 0.0)
+            v[a] = self.scale(w, 0) * ti.select(inside, v[a], self.mean(w, a))
+        return v, slope
+
+    @ti.func
+    def place(self, w, r):
+        """Return r in cells from the lower corner, moved into the box or the middle of a wall; whether the
+        velocity there is interpolated; and the cells per length (1/m) by which it changes."""
+        place, inside, per = 0.0 * r, True, 0.0 * r
+        for a in ti.static(range(3)):
+            n, whole = ti.static(float(self.cells[a]), float(self.shape[a]))
+            per[a] = n / (self.high(w)[a] - self.low(w)[a])
+            place[a] = (r[a] - self.low(w)[a]) * per[a]
+            if ti.static(self.walled[a]):
+                place[a] = ti.min(ti.max(place[a], -0.5), n + 0.5)
+                per[a] = ti.select(place[a] > -0.5 and place[a] < n + 0.5, per[a], 0.0)
+            elif ti.static(self.outside == "uniform"):
+                inside = inside and place[a] >= 0.0 and place[a] <= n
+                place[a] = ti.min(ti.max(place[a], 0.0), n)
+            else:
+                place[a] -= whole * ti.floor(place[a] / whole)
+        return place, inside, per
+
+    @ti.func
+    def splines(self, place, a: ti.template()):  # type: ignore[valid-type]
+        """Return the first faces along each axis on which component a depends, the weights of these and the
+        following faces, and their derivatives by the place."""
+        first = ti.Vector([0, 0, 0])
+        weight, change = ti.Matrix.zero(float, 3, 3), ti.Matrix.zero(float, 3, 3)
+        for b in ti.static(range(3)):
+            if ti.static(a == b):
+                nearest = ti.floor(place[b] + 0.5)
+                x = place[b] - nearest
+                first[b] = ti.cast(nearest, ti.i32) - 1
+                weight[b, 0], weight[b, 1], weight[b, 2] = (
+                    0.5 * (0.5 - x) ** 2,
+                    0.75 - x * x,
+                    0.5 * (0.5 + x) ** 2,
+                )
+                change[b, 0], change[b, 1], change[b, 2] = x - 0.5, -2.0 * x, x + 0.5
+            else:
+                lower = ti.floor(place[b] - 0.5)
+                x = place[b] - 0.5 - lower
+                first[b] = ti.cast(lower, ti.i32)
+                weight[b, 0], weight[b, 1] = 1.0 - x, x
+                change[b, 0], change[b, 1] = -1.0, 1.0
+        return first, weight, change
+
+    @ti.func
+    def wrapped(self, i, axis: ti.template()):  # type: ignore[valid-type]
+        """Return the index of the periodic image, inside the grid, of cell i along an axis."""
+        n = ti.static(self.shape[axis])
+        return (i % n + n) % n
