@@ -20,7 +20,7 @@ from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 from tisim.state.fields import Field, WorldField
 
-CLEARANCE = (
+CLEARANCE_FIELDS = (
     Field("clearance", "m", 1, "keep", scratch=True),
     Field("cleared_from", "m", 3, "keep", scratch=True),
 )
@@ -78,7 +78,7 @@ class Capture(TouchingMagnets):
         return {} if self.release is None else {"release": self.release}
 
     def required_fields(self) -> tuple[str | Field, ...]:
-        return (*self.fields, *CLEARANCE, *(self.release_fields if self.release else ()))
+        return (*self.fields, *CLEARANCE_FIELDS, *(self.release_fields if self.release else ()))
 
     def required_world_fields(self) -> tuple[WorldField, ...]:
         releases = (WorldField("releases", "counter"),) if self.release else ()
