@@ -55,7 +55,7 @@ REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
 LONGEST_MOVE = 0.05
 """Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D."""
-TABLE_DIGITS = 3
+DIGITS = 3
 """Number of digits of the field; random motion outweighs this error."""
 APPROACH = 1.0
 """Distance of the faces at which colloids enter and leave from the matrix, in lengths of a fibre."""
@@ -186,7 +186,9 @@ class PackedFilter:
             domain=box,
             effects=(
                 MagneticField(constant=self.field(), end=self.field_end),
-                MagneticCylinders(cylinders=magnets, table_digits=TABLE_DIGITS, end=self.field_end),
+                MagneticCylinders(
+                    cylinders=magnets, table_digits=DIGITS, sum_digits=DIGITS, end=self.field_end
+                ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
                 Magnetophoresis(),
                 Capture(release=self.release()),

@@ -196,8 +196,14 @@ def _needs(kind: type[Component]) -> Iterator[str]:
         yield "a stepper with inertia, not brownian"
     if kind.incompatible_controls:
         yield f"another step control than {' or '.join(kind.incompatible_controls)}"
-    for source in FAMILIES["sources"].kinds().values():
-        yield from (f"{source.kind()}, a row of its {name}" for name, row in source.lists() if row is kind)
+    rows = [
+        f"{source.kind()}, a row of its {name}"
+        for source in FAMILIES["sources"].kinds().values()
+        for name, row in source.lists()
+        if row is kind
+    ]
+    if rows:
+        yield " or ".join(rows)
     if issubclass(kind, Stepper):
         control = kind.model_fields["control"].annotation
         yield f"a step control: {' or '.join(_suiting(control))}"

@@ -25,7 +25,9 @@ class TouchingMagnets(Operator):
         from its surface (m), negative inside; and the unit vector along which this distance increases."""
         before, by, least, outward = 0, -1, 0.0 * radius + ti.math.inf, 0.0 * r
         for magnets in ti.static(self.magnets):
-            for k in range(magnets.each.size(w)):
+            first, end, listed = magnets.nearby(w, r, radius)
+            for e in range(first, end):
+                k = magnets.body(w, e, listed)
                 distance, normal = magnets.each.nearest(w, k, r)
                 if distance <= least:
                     least, by, outward = distance, before + k, normal

@@ -186,9 +186,9 @@ class CellSum:
         return ti.cast(self.number(w, at), ti.i32), ti.cast(self.number(w, at + 1), ti.i32)
 
     @ti.func
-    def index(self, w, e):
-        """Return the index of the cylinder at a place in the list."""
-        return ti.cast(self.number(w, self.listed + e), ti.i32)
+    def index(self, w, e, listed):
+        """Return the index of the cylinder at place e in the list, or e itself unless ``listed``."""
+        return ti.select(listed > 0, ti.cast(self.number(w, self.listed + listed * e), ti.i32), e)
 
     @ti.func
     def distant(self, w, leaf, x, half, slopes: ti.template()):  # type: ignore[valid-type]
@@ -202,19 +202,19 @@ class CellSum:
             potential[k] = self.number(w, first + k)
         parts = [ti.Vector([zero] * size) for _ in ti.static(range(3))]
         b, slope = 0.0 * x, 0.0 * x.outer_product(x)
-        for l in range(self.degree):  # noqa: E741
-            for m in range(l + 1):
-                k = l * (l + 1) + 2 * m
+        for n in range(self.degree):
+            for m in range(n + 1):
+                k = n * (n + 1) + 2 * m
                 for a in ti.static(range(3)):
-                    one = solid_harmonics.shifted(potential, l, m, a)
+                    one = solid_harmonics.shifted(potential, n, m, a)
                     b[a] += one[0] * basis[k] + one[1] * basis[k + 1]
                     parts[a][k], parts[a][k + 1] = one[0], one[1]
         if ti.static(slopes):
-            for l in range(self.degree - 1):  # noqa: E741
-                for m in range(l + 1):
-                    k = l * (l + 1) + 2 * m
+            for n in range(self.degree - 1):
+                for m in range(n + 1):
+                    k = n * (n + 1) + 2 * m
                     for a, c in ti.static(GRADIENT):
-                        one = solid_harmonics.shifted(parts[a], l, m, c)
+                        one = solid_harmonics.shifted(parts[a], n, m, c)
                         slope[a, c] += one[0] * basis[k] + one[1] * basis[k + 1]
             slope[2, 2] = -slope[0, 0] - slope[1, 1]
             for a, c in ti.static(((0, 1), (0, 2), (1, 2))):

@@ -33,6 +33,10 @@ GRADIENT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 """The independent elements of the gradient, a symmetric and traceless matrix."""
 OCTANTS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 """Centres of the parts of a cell, in the order x, y, z."""
+LEAST_GAP = 2.0
+"""Smallest distance of a distant cylinder from the centre of a cell, in half sides. No point of the cell is
+farther than sqrt(3) from the centre, so all cylinders within 2 - sqrt(3) half sides of any of its points are
+near, also those without a field."""
 PAIRS_AT_ONCE = 20_000
 """Number of pairs of a cell and a cylinder that are processed together."""
 SLACK = 0.8
@@ -206,7 +210,7 @@ def _accept(
     size = cells[pairs[:, 0], 3]
     away = (gap + numbers[pairs[:, 1], cylinder_rows.SLOTS["radius"]]) / size
     distant = np.zeros(len(pairs), bool)
-    tried = np.flatnonzero((gap > size) & (away > SLACK * reach))
+    tried = np.flatnonzero((gap > LEAST_GAP * size) & (away > SLACK * reach))
     for begin in range(0, len(tried), PAIRS_AT_ONCE):
         chosen = tried[begin : begin + PAIRS_AT_ONCE]
         data = fields(numbers, cells, pairs[chosen], _face_nodes()).reshape(len(chosen), -1)

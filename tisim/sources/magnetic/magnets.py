@@ -78,7 +78,10 @@ class Magnets(Switched):
 
     @ti.func
     def value(self, w, r, t):
-        return self.direct_value(w, r, t)
+        b = 0.0 * r
+        for k in range(self.magnetised(w, t)):
+            b += self.each.flux_density(w, k, r)
+        return b
 
     @ti.func
     def gradient(self, w, r, t):
@@ -86,23 +89,6 @@ class Magnets(Switched):
 
     @ti.func
     def value_and_gradient(self, w, r, t):
-        return self.direct(w, r, t)
-
-    @ti.func
-    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        self.add_direct(w, r, t, value, gradient)
-
-    @ti.func
-    def direct_value(self, w, r, t):
-        """Return the field at r (m), the sum over the bodies one by one."""
-        b = 0.0 * r
-        for k in range(self.magnetised(w, t)):
-            b += self.each.flux_density(w, k, r)
-        return b
-
-    @ti.func
-    def direct(self, w, r, t):
-        """Return the field at r (m) and its gradient, the sums over the bodies one by one."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
         for k in range(self.magnetised(w, t)):
             one, slope = self.each.flux(w, k, r)
@@ -111,8 +97,12 @@ class Magnets(Switched):
         return b, gradient
 
     @ti.func
-    def add_direct(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        """Add the sums over the bodies one by one, at a tile of points (see ``add_tile``)."""
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        self.add_each(w, r, t, value, gradient)
+
+    @ti.func
+    def add_each(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        """Add field and gradient of the bodies one by one at a tile of points, as ``add_tile`` does."""
         # First the points for which the vectorised form is valid, then the others one by one; a tile of one
         # point has no vectors.
         size = ti.static(r[0].n)
@@ -132,6 +122,18 @@ class Magnets(Switched):
                         place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
                         b, slope = self.each.flux(w, k, place)
                         add_point(value, gradient, lane, b, slope)
+
+    @ti.func
+    def nearby(self, w, r, radius):
+        """Return a range in which are all bodies that a sphere of a radius (m) at r may touch: of places in a
+        list of near bodies and 1, or of their indices and 0."""
+        return 0, self.each.size(w), 0
+
+    @ti.func
+    def body(self, w, e, listed):
+        """Return the index of the body at place e of the list of near bodies, or e itself unless
+        ``listed``."""
+        return e
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         ((bodies, _),) = self.lists()

@@ -101,8 +101,8 @@ class PoreFlow(Source):
     outside: Literal["periodic", "uniform"] = option(
         "velocity outside of the box: of its periodic images, or the superficial velocity", "periodic"
     )
-    tolerance: float = option(
-        "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
+    tolerance: float = parameter(
+        "", "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
     )
 
     if TYPE_CHECKING:
@@ -237,11 +237,11 @@ class PoreFlow(Source):
         v, slope = 0.0 * r, 0.0 * r.outer_product(r)
         for a in ti.static(range(3)):
             first, weight, change = self.splines(place, a)
-            for i in range(ti.static(3 if a == 0 else 2)):
+            for i in ti.static(range(3 if a == 0 else 2)):
                 x = self.wrapped(first[0] + i, 0)
-                for j in range(ti.static(3 if a == 1 else 2)):
+                for j in ti.static(range(3 if a == 1 else 2)):
                     y = self.wrapped(first[1] + j, 1)
-                    for k in range(ti.static(3 if a == 2 else 2)):
+                    for k in ti.static(range(3 if a == 2 else 2)):
                         z = self.wrapped(first[2] + k, 2)
                         n = ti.static(self.shape)
                         u = self.grid(w, ((a * n[0] + x) * n[1] + y) * n[2] + z)
