@@ -24,8 +24,8 @@ CLEARANCE_FIELDS = (
     Field("clearance", "m", 1, "keep", scratch=True),
     Field("cleared_from", "m", 3, "keep", scratch=True),
 )
-"""The distance to the nearest magnet when a particle was last compared with all of them, and its place then.
-It can touch none before it has moved by the difference of this distance and its radius."""
+"""A distance within which there was no magnet when one was last looked for, and the place of the particle
+then. It can touch none before it has moved by the difference of this distance and its radius."""
 SURE = 0.999
 """Part of this path in which no magnet is looked for, whatever the rounding."""
 
