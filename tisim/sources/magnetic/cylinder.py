@@ -187,12 +187,13 @@ class MagneticCylinders(Magnets):
 
     @ti.func
     def nearby(self, w, r, radius):
-        first, end, listed = 0, self.each.size(w), 0
+        first, end, listed, reach = 0, self.each.size(w), 0, 0.0 * radius + ti.math.inf
         if ti.static(self.has_cells):
             leaf, _x, half = self.octree.leaf(w, r)
             if radius < NEAR_REACH * half:
                 first, end, listed = self.near_cylinders(w, leaf)
-        return first, end, listed
+                reach = ti.select(listed > 0, NEAR_REACH * half, reach)
+        return first, end, listed, reach
 
     @ti.func
     def body(self, w, e, listed):

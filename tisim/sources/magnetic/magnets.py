@@ -126,8 +126,9 @@ class Magnets(Switched):
     @ti.func
     def nearby(self, w, r, radius):
         """Return a range in which are all bodies that a sphere of a radius (m) at r may touch: of places in a
-        list of near bodies and 1, or of their indices and 0."""
-        return 0, self.each.size(w), 0
+        list of near bodies and 1, or of their indices and 0; and a distance (m), at least the radius, from r
+        within which no other body is, infinite if the range has all bodies."""
+        return 0, self.each.size(w), 0, 0.0 * radius + ti.math.inf
 
     @ti.func
     def body(self, w, e, listed):
