@@ -32,7 +32,9 @@ class TouchingMagnets(Operator):
             first, end, listed, reach = magnets.nearby(w, r, radius)
             complete = ti.min(complete, reach)
             for e in range(first, end):
-                k = magnets.body(w, e, listed)
+                k = e
+                if listed:
+                    k = magnets.near_body(w, e)
                 distance, normal = magnets.each.nearest(w, k, r)
                 if distance <= least:
                     least, by, outward = distance, before + k, normal

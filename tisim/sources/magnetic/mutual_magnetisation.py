@@ -82,7 +82,7 @@ def magnetise(
         must(is_whole(k, 0) and k < len(cylinders), "permanent", "indices of cylinders", k)
         kept[k] = True
     linear = susceptibility is not None
-    must(not linear or susceptibility > 0, "susceptibility", "greater than 0", susceptibility)
+    must(susceptibility is None or susceptibility > 0, "susceptibility", "greater than 0", susceptibility)
     limit = np.broadcast_to(np.asarray(saturation, float), len(cylinders))
     allowed = (limit > 0) & (linear | np.isfinite(limit))
     must(bool(allowed.all()), "saturation", "greater than 0" + ("" if linear else " and finite"), saturation)
