@@ -22,6 +22,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from scipy.constants import Boltzmann
+from scipy.fft import next_fast_len
 
 from tisim import Box, Particles, Scene
 from tisim.cases.case import Size, size_named
@@ -52,9 +53,9 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 1e-9, 20e-9
 """Radii of the smallest and largest colloids, m."""
 REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
-LONGEST_MOVE = 0.025
+LONGEST_MOVE = 0.05
 """Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D."""
-TABLE_DIGITS = 3
+DIGITS = 3
 """Number of digits of the field; random motion outweighs this error."""
 APPROACH = 1.0
 """Distance of the faces at which colloids enter and leave from the matrix, in lengths of a fibre."""
@@ -185,7 +186,9 @@ class PackedFilter:
             domain=box,
             effects=(
                 MagneticField(constant=self.field(), end=self.field_end),
-                MagneticCylinders(cylinders=magnets, table_digits=TABLE_DIGITS, end=self.field_end),
+                MagneticCylinders(
+                    cylinders=magnets, table_digits=DIGITS, sum_digits=DIGITS, end=self.field_end
+                ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
                 Magnetophoresis(),
                 Capture(release=self.release()),
@@ -206,7 +209,7 @@ class PackedFilter:
         flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed))
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
-            x, y, z = (int(np.ceil(self.resolution * one)) for one in size)
+            x, y, z = (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
             flow = PoreFlow(
                 low=(left, front, first),
                 high=(right, back, last),

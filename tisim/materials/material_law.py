@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, Self
 
 from pydantic import PrivateAttr
@@ -75,7 +76,7 @@ class MaterialLaw(UsesMaterials):
     def number_of_materials(self) -> int:
         return max(1, len(self._materials.named))
 
-    def derived_rows(self) -> dict[str, list[float]]:
+    def derived_rows(self) -> dict[str, Sequence[float]]:
         rows = [self.mix(pair) for pair in self._materials.touching()]
         return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
 

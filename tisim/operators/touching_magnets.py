@@ -21,15 +21,19 @@ class TouchingMagnets(Operator):
 
     @ti.func
     def touched(self, w, r, radius):
-        """Return the number of the nearest magnet that a sphere at r (m) touches, or -1, with the distance of
-        r from its surface (m) and the unit vector along which this distance increases."""
-        before, by, least, outward = 0, -1, radius, 0.0 * r
+        """Return the number of the nearest magnet if a sphere at r (m) touches it, or -1; the distance of r
+        from its surface (m), negative inside; and the unit vector along which this distance increases."""
+        before, by, least, outward = 0, -1, 0.0 * radius + ti.math.inf, 0.0 * r
         for magnets in ti.static(self.magnets):
-            for k in range(magnets.each.size(w)):
+            first, end, listed = magnets.nearby(w, r, radius)
+            for e in range(first, end):
+                k = magnets.body(w, e, listed)
                 distance, normal = magnets.each.nearest(w, k, r)
                 if distance <= least:
                     least, by, outward = distance, before + k, normal
             before += magnets.each.size(w)
+        if least > radius:
+            by = -1
         return by, least, outward
 
     @ti.func

@@ -47,7 +47,7 @@ class Shaped(Effect):
         # Rows of derived numbers have one for each shape.
         return (*super().structure(), len(self.shapes()))
 
-    def derived_rows(self) -> dict[str, list[float]]:
+    def derived_rows(self) -> dict[str, Sequence[float]]:
         shapes = self.shapes()
         moments = np.array([one.moments() / one.bounding_radius() ** 2 for one in shapes])
         return {

@@ -6,9 +6,7 @@ import numpy as np
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
-from tisim.sources.magnetic import cylinder_field
 from tisim.sources.magnetic.cylinder_body import Cylinder
-from tisim.sources.magnetic.cylinder_frame import relative_place
 
 
 def rows(cylinders: Sequence[Cylinder]) -> np.ndarray:
@@ -41,16 +39,12 @@ def number(rows: ti.template(), k, name: ti.template()):  # type: ignore[valid-t
 
 
 @ti.func
-def axis(rows: ti.template(), k):  # type: ignore[valid-type]
-    """Return the unit vector along the axis of cylinder k."""
-    return vector(rows, k, "lead") + vector(rows, k, "rest")
-
-
-@ti.func
-def shape_at(rows: ti.template(), k, r, ends: ti.template()):  # type: ignore[valid-type]
-    """Return the six functions of ``cylinder_field`` of cylinder k at r (m), the distance from its axis, and
-    the unit vector away from it."""
-    half, radius = 0.5 * number(rows, k, "length"), number(rows, k, "radius")
-    lead, rest = vector(rows, k, "lead"), vector(rows, k, "rest")
-    rho, outward, z, end = relative_place(r, vector(rows, k, "centre"), lead, rest, half)
-    return cylinder_field.shape(rho, z, end, radius, half, ends), rho, outward
+def placed(rows: ti.template(), k):  # type: ignore[valid-type]
+    """Return centre (m), both parts of the direction, radius and half length (m) of cylinder k."""
+    return (
+        vector(rows, k, "centre"),
+        vector(rows, k, "lead"),
+        vector(rows, k, "rest"),
+        number(rows, k, "radius"),
+        0.5 * number(rows, k, "length"),
+    )

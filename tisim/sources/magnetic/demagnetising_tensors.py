@@ -15,6 +15,7 @@ from tisim.packing.random_bodies import segment_distances
 from tisim.sources.magnetic import cylinder_field, cylinder_rows
 from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
+from tisim.sources.magnetic.cylinder_frame import relative_place
 from tisim.sources.magnetic.stoner_wohlfarth import demagnetising_factor
 
 ALONG = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
@@ -35,18 +36,18 @@ def _means(
     """Average W_ij of cylinder j over nodes in cylinder i, given in units of its radius and half length."""
     for e in range(pairs.shape[0]):
         i, j = pairs[e, 0], pairs[e, 1]
-        up, radius = cylinder_rows.axis(rows, i), cylinder_rows.number(rows, i, "radius")
-        half, centre = 0.5 * cylinder_rows.number(rows, i, "length"), cylinder_rows.vector(rows, i, "centre")
-        aside = ti.Vector([0.0, 0.0, 1.0])
+        here, lead_here, rest_here, size, length = cylinder_rows.placed(rows, i)
+        centre, lead, rest, radius, half = cylinder_rows.placed(rows, j)
+        up, aside = lead_here + rest_here, ti.Vector([0.0, 0.0, 1.0])
         if ti.abs(up[2]) > 0.7:
             aside = ti.Vector([1.0, 0.0, 0.0])
         first = up.cross(aside).normalized()
-        second, axis = up.cross(first), cylinder_rows.axis(rows, j)
-        mean = ti.Matrix.zero(float, 3, 3)
+        second, mean = up.cross(first), ti.Matrix.zero(float, 3, 3)
         for q in range(nodes.shape[0]):
-            r = centre + half * nodes[q, 2] * up + radius * (nodes[q, 0] * first + nodes[q, 1] * second)
-            six, rho, outward = cylinder_rows.shape_at(rows, j, r, ends)
-            mean += nodes[q, 3] * cylinder_field.tensor(six, rho, outward, axis)
+            r = here + length * nodes[q, 2] * up + size * (nodes[q, 0] * first + nodes[q, 1] * second)
+            rho, outward, z, end = relative_place(r, centre, lead, rest, half)
+            six = cylinder_field.shape(rho, z, end, radius, half, ends)
+            mean += nodes[q, 3] * cylinder_field.tensor(six, rho, outward, lead + rest)
         for a, b in ti.static(ti.ndrange(3, 3)):
             out[e, 3 * a + b] = mean[a, b]
 

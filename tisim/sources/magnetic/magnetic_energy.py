@@ -76,11 +76,28 @@ class MagneticEnergy:
         unit = m / np.where(size > 0, size, 1.0)[:, None]
         along = np.einsum("ia,ia->i", drive, unit)
         # A saturated magnetisation can turn, and shorten if it is soft, but not grow.
-        held = np.full(len(m), True) if stiffness is None else (size >= (1 - 1e-12) * self.limit) & (along > 0)
+        held = (
+            np.full(len(m), True) if stiffness is None else (size >= (1 - 1e-12) * self.limit) & (along > 0)
+        )
         drive = drive - np.where(held, along, 0.0)[:, None] * unit
         largest = max(np.linalg.norm(self.field), np.linalg.norm(own, axis=1).max())
         left = np.linalg.norm(drive, axis=1)[~self.kept].max(initial=0.0)
         return float(left / largest) if largest > 0 else 0.0
+
+    def minimise(self, stiffness: float | None, tolerance: float, iterations: int) -> tuple[int, float]:
+        """Iterate until the imbalance is at most the tolerance; return the number of iterations, at most
+        ``iterations``, and the imbalance.
+
+        stiffness : 1 / chi; None for bodies that are always saturated.
+        """
+        count, imbalance = 0, np.inf
+        while count < iterations and not imbalance <= tolerance:
+            if stiffness is None:
+                self.rotate()
+            else:
+                self.descend(stiffness)
+            count, imbalance = count + 1, self.imbalance(stiffness)
+        return count, imbalance
 
     def saturate(self, wholes: Sequence[Cylinder]) -> None:
         """Start with the magnetisations that the cylinders would have alone in the uniform field.

@@ -98,6 +98,11 @@ class Magnets(Switched):
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        self.add_each(w, r, t, value, gradient)
+
+    @ti.func
+    def add_each(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        """Add field and gradient of the bodies one by one at a tile of points, as ``add_tile`` does."""
         # First the points for which the vectorised form is valid, then the others one by one; a tile of one
         # point has no vectors.
         size = ti.static(r[0].n)
@@ -117,6 +122,18 @@ class Magnets(Switched):
                         place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
                         b, slope = self.each.flux(w, k, place)
                         add_point(value, gradient, lane, b, slope)
+
+    @ti.func
+    def nearby(self, w, r, radius):
+        """Return a range in which are all bodies that a sphere of a radius (m) at r may touch: of places in a
+        list of near bodies and 1, or of their indices and 0."""
+        return 0, self.each.size(w), 0
+
+    @ti.func
+    def body(self, w, e, listed):
+        """Return the index of the body at place e of the list of near bodies, or e itself unless
+        ``listed``."""
+        return e
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         ((bodies, _),) = self.lists()

@@ -6,7 +6,6 @@ cylinder, or each piece of it, is magnetised uniformly and responds to the mean 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -99,21 +98,14 @@ def magnetise(
     stiffness = None if susceptibility is None else 1 / susceptibility
     if stiffness is None:
         energy.saturate(cylinders)
-    imbalance = math.inf
-    for turn in range(1, iterations + 1):
-        if stiffness is None:
-            energy.rotate()
-        else:
-            energy.descend(stiffness)
-        imbalance = energy.imbalance(stiffness)
-        if not imbalance > tolerance:
-            break
-    must(imbalance <= tolerance, "tolerance", f"met within {iterations} iterations", Words(f"{imbalance:.2g}"))
+    turns, imbalance = energy.minimise(stiffness, tolerance, iterations)
+    met = imbalance <= tolerance
+    must(met, "tolerance", f"met within {iterations} iterations", Words(f"{imbalance:.2g}"))
     result = Magnetised(
         one.model_copy(update={"magnetisation": (float(a), float(b), float(c))})
         for one, (a, b, c) in zip(pieces, energy.magnetisation, strict=True)
     )
-    result.iterations, result.imbalance = turn, imbalance
+    result.iterations, result.imbalance = turns, imbalance
     return result
 
 
