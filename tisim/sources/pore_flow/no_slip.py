@@ -67,7 +67,7 @@ class NoSlip:
         return cls(np.concatenate(index), np.concatenate(compliance), (x, y, z), solid)
 
     def inside(self) -> np.ndarray:
-        """Return the solid faces that are not among those of ``index``, shape (3, nx, ny, nz)."""
+        """Return the solid faces that are not in ``index``, shape (3, nx, ny, nz)."""
         inside = self.solid.copy()
         inside.reshape(-1)[self.index] = False
         return inside
