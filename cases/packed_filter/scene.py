@@ -94,8 +94,9 @@ class PackedFilter:
     """A filter and the suspension in it.
 
     matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
-    magnetise each other. speed : superficial velocity of the water, the volume flow over the cross section of
-    the column, m/s. flow : "resolved" between the fibres, or "uniform" with the mean velocity in the pores.
+    magnetise each other. digits : of the sum of their fields. speed : superficial velocity of the water, the
+    volume flow over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform"
+    with the mean velocity in the pores.
     resolution : cells of the resolved flow over D. feed : time until which colloids enter, s. field_end :
     time at which the field is switched off, s. adhering : fraction of captured colloids that are never
     released; None for captures that last for ever. mean_radius, polydispersity : of the colloids, m, and
@@ -106,6 +107,7 @@ class PackedFilter:
     mode: Mode = "static"
     flux: float = 1.0
     mutual: bool = True
+    digits: int = DIGITS
     speed: float = 1e-4
     flow: Literal["resolved", "uniform"] = "resolved"
     resolution: float = 5.0
@@ -187,7 +189,10 @@ class PackedFilter:
             effects=(
                 MagneticField(constant=self.field(), end=self.field_end),
                 MagneticCylinders(
-                    cylinders=magnets, table_digits=DIGITS, sum_digits=DIGITS, end=self.field_end
+                    cylinders=magnets,
+                    table_digits=DIGITS,
+                    sum_digits=self.digits,
+                    end=self.field_end,
                 ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
                 Magnetophoresis(),

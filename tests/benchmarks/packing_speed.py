@@ -1,7 +1,7 @@
 """CPU time of packing steppers: an attempt by the number of bodies, a batch beside single runs, packings a
-minute, and FIRE beside LAMMPS: the tables in docs/packings.md.
+minute, superballs near the end of a packing, and FIRE beside LAMMPS: the tables in docs/packings.md.
 
-    python tests/benchmarks/packing_speed.py [--parts attempts batch fire] [--most 100000] [--turns 3]
+    python tests/benchmarks/packing_speed.py [--parts PART ...] [--most 100000] [--turns 3]
 
 All on one thread. ``narrow_phase.py`` has the time of a pair, beside coal.
 
@@ -10,6 +10,8 @@ packing fraction of 0.5, after 200 steps. Steps are measured with the list
 rebuilds they cause.
 
 batch: 100 packings of 100 bodies each, from 0.2 to the end, in one batch and one after the other.
+
+superballs: attempts of the packings of docs/packing_study.md, from attempt 40,000 on, when most pairs touch.
 
 fire: the same spheres with the same springs at a packing fraction of 0.68, above jamming: U = 1/2 sum
 (delta/D)^2, by ``min_style fire`` of LAMMPS, which is FIRE 2.0 too, with ``pair_style harmonic/cut``. The
@@ -36,7 +38,8 @@ from tisim.analysis.packings.gaps import near_gaps
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.backend import runtime
 from tisim.backend.processor import processor
-from tisim.cases.packing.scene import hard, rod, spheroid, superball
+from tisim.cases.packing.scene import hard, of_shape, rod, spheroid, superball
+from tisim.cases.packing.studies import plans
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.steppers import EnergyMinimisation, MechanicalContraction, MonteCarloGrowth
 from tisim.steppers.packing.packing_stepper import PackingStepper
@@ -58,6 +61,8 @@ WARM, TIMED = 200, 50
 PACKED = ("spheres", "rods, L/D = 0.5")
 WORLDS, BODIES = 100, 100
 """The packings of a batch: bodies, number of packings, and bodies of each."""
+EXPONENTS, NEAR_END, ATTEMPTS = (2.5, 3.0, 5.0), 40_000, 5000
+"""The superballs whose attempts are timed near the end, the attempts before the measurement, and in it."""
 EVALUATIONS = 400
 """Evaluations of FIRE that are timed."""
 
@@ -160,6 +165,22 @@ def batch(turns: int) -> None:
             single.close()
 
 
+def superballs(turns: int) -> None:
+    """Print the table of superballs near the end of a packing."""
+    print("an attempt of superballs near the end of a packing, CPU time, us a body")
+    print("| exponent | contraction |")
+    print("|---|---|")
+    for exponent in EXPONENTS:
+        (plan,) = (one for one in plans("superballs") if one.shape == exponent)
+        scene = of_shape(plan.body(), "default", 0, **plan.options("default"))
+        simulation = Simulation(scene, 1)
+        simulation.load([scene])
+        simulation.run(steps=NEAR_END)
+        times = [used(partial(simulation.run, steps=ATTEMPTS)) for _ in range(turns)]
+        simulation.close()
+        print(f"| {exponent:g} | {spread(1e6 * np.array(times) / ATTEMPTS / scene.capacity())} |", flush=True)
+
+
 def fire(most: int, turns: int) -> None:
     """Print the table of FIRE beside LAMMPS."""
     if not lammps_peer.installed():
@@ -222,7 +243,7 @@ def main() -> None:
     options = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("--parts", nargs="+", default=["attempts", "batch", "fire"])
+    options.add_argument("--parts", nargs="+", default=["attempts", "batch", "superballs", "fire"])
     options.add_argument("--most", type=int, default=100_000)
     options.add_argument("--turns", type=int, default=3)
     given = options.parse_args()
@@ -233,6 +254,8 @@ def main() -> None:
         attempts(given.most, given.turns)
     if "batch" in given.parts:
         batch(given.turns)
+    if "superballs" in given.parts:
+        superballs(given.turns)
     if "fire" in given.parts:
         fire(min(given.most, 10_000), given.turns)
 

@@ -129,7 +129,7 @@ def test_needs_of_parts():
     assert needs["friction"] == ("impact",)
     assert needs["contact_bond"] == ("contact or hertz", "a stepper with inertia, not brownian")
     assert needs["lorentz"][0] == "a source of electric_field or magnetic_flux_density"
-    assert needs["sphere"] == ("magnetic_spheres, a row of its spheres",)
+    assert needs["sphere"] == ("magnetic_spheres, a row of its spheres or pore_flow, a row of its spheres",)
     assert needs["collocation"] == ("a step control: stage_control",)
     # If a test of another file defines an event of its own, the text is "no impact or recorder".
     assert any(one.startswith("no impact") for one in needs["capture"])

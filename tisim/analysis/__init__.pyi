@@ -75,7 +75,9 @@ from .packings.packing_fractions import fraction_profile as fraction_profile
 from .packings.packing_fractions import packing_fraction as packing_fraction
 from .packings.packing_fractions import sampled_fraction as sampled_fraction
 from .packings.permeability import permeability as permeability
+from .packings.permeability import solid_bodies as solid_bodies
 from .packings.permeability import specific_surface as specific_surface
+from .packings.permeability import stokes_permeability as stokes_permeability
 from .packings.pores import PoreSizes as PoreSizes
 from .packings.pores import pore_image as pore_image
 from .packings.pores import pore_sizes as pore_sizes

@@ -26,7 +26,9 @@ from tisim.geometry.container import Container
 from tisim.geometry.shape import Shape
 from tisim.materials.materials import ContactProperties
 from tisim.operators.base import Operator
+from tisim.operators.release import Release
 from tisim.packing.grains import GrainClass
+from tisim.packing.magnetic_core import MagneticCore
 from tisim.packing.placement import Placement
 from tisim.packing.sizes import SizeDistribution
 from tisim.scene import plugins
@@ -74,12 +76,14 @@ FAMILIES = {
     "contact_parts": Family("Parts of granular contact laws", ContactPart, ""),
     "materials": Family("Materials", ContactProperties, ""),
     "operators": Family("Operators", Operator, "effects.NAME"),
+    "releases": Family("Releases of captured particles", Release, "effects.capture.release"),
     "steppers": Family("Steppers", Stepper, "stepper"),
     "step_controls": Family("Step controls", StepControl, "stepper.control"),
     "starts": Family("Starts", Start, "particles"),
     "placements": Family("Placements", Placement, "particles.placement"),
     "grain_classes": Family("Classes of grains", GrainClass, ""),
     "size_distributions": Family("Size distributions", SizeDistribution, "particles.grains.sizes"),
+    "cores": Family("Magnetic cores of grains", MagneticCore, "particles.grains.core"),
     "pulses": Family("Pulses", Pulse, "particles.pulse"),
     "domains": Family("Domains", Domain, "domain"),
 }
@@ -192,8 +196,14 @@ def _needs(kind: type[Component]) -> Iterator[str]:
         yield "a stepper with inertia, not brownian"
     if kind.incompatible_controls:
         yield f"another step control than {' or '.join(kind.incompatible_controls)}"
-    for source in FAMILIES["sources"].kinds().values():
-        yield from (f"{source.kind()}, a row of its {name}" for name, row in source.lists() if row is kind)
+    rows = [
+        f"{source.kind()}, a row of its {name}"
+        for source in FAMILIES["sources"].kinds().values()
+        for name, row in source.lists()
+        if row is kind
+    ]
+    if rows:
+        yield " or ".join(rows)
     if issubclass(kind, Stepper):
         control = kind.model_fields["control"].annotation
         yield f"a step control: {' or '.join(_suiting(control))}"

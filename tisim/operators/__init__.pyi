@@ -18,3 +18,4 @@ from .passage import Passage as Passage
 from .peak_displacement import PeakDisplacement as PeakDisplacement
 from .peak_height import PeakHeight as PeakHeight
 from .release import Release as Release
+from .touching_magnets import TouchingMagnets as TouchingMagnets

@@ -20,6 +20,15 @@ from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 from tisim.state.fields import Field, WorldField
 
+CLEARANCE_FIELDS = (
+    Field("clearance", "m", 1, "keep", scratch=True),
+    Field("cleared_from", "m", 3, "keep", scratch=True),
+)
+"""A distance within which there was no magnet when one was last looked for, and the place of the particle
+then. It can touch none before it has moved by the difference of this distance and its radius."""
+SURE = 0.999
+"""Part of this path in which no magnet is looked for, whatever the rounding."""
+
 
 class Capture(TouchingMagnets):
     """A particle that touches a magnet of the scene is fixed at the point of contact.
@@ -69,7 +78,7 @@ class Capture(TouchingMagnets):
         return {} if self.release is None else {"release": self.release}
 
     def required_fields(self) -> tuple[str | Field, ...]:
-        return (*self.fields, *(self.release_fields if self.release else ()))
+        return (*self.fields, *CLEARANCE_FIELDS, *(self.release_fields if self.release else ()))
 
     def required_world_fields(self) -> tuple[WorldField, ...]:
         releases = (WorldField("releases", "counter"),) if self.release else ()
@@ -87,9 +96,11 @@ class Capture(TouchingMagnets):
 
     @ti.func
     def particle(self, s, w, i, t, dt):
-        if s.fixed[w, i] == 0:
-            r, radius = s.position[w, i], s.radius[w, i]
+        r, radius = s.position[w, i], s.radius[w, i]
+        clear = ti.max(SURE * (s.clearance[w, i] - radius), 0.0)
+        if s.fixed[w, i] == 0 and not ((r - s.cleared_from[w, i]).norm_sqr() < clear * clear):
             by, distance, outward = self.touched(w, r, radius)
+            s.clearance[w, i], s.cleared_from[w, i] = distance, r
             if by >= 0:
                 s.position[w, i] = r + (radius - distance) * outward
                 if self.holds(s, w, i, t, outward):

@@ -21,11 +21,16 @@ class TouchingMagnets(Operator):
 
     @ti.func
     def touched(self, w, r, radius):
-        """Return the number of the nearest magnet that a sphere at r (m) touches, or -1, with the distance of
-        r from its surface (m) and the unit vector along which this distance increases."""
-        before, by, least, outward = 0, -1, radius, 0.0 * r
+        """Return the number of the nearest magnet if a sphere at r (m) touches it, or -1; the distance of r
+        from its surface (m), negative inside; and the unit vector along which this distance increases.
+
+        If it touches none, the distance may be less than that from the nearest magnet, but never more.
+        """
+        before, by, least, outward = 0, -1, 0.0 * radius + ti.math.inf, 0.0 * r
+        complete = least
         for magnets in ti.static(self.magnets):
-            first, end, listed = magnets.nearby(w, r, radius)
+            first, end, listed, reach = magnets.nearby(w, r, radius)
+            complete = ti.min(complete, reach)
             for e in range(first, end):
                 k = e
                 if listed:
@@ -34,6 +39,8 @@ class TouchingMagnets(Operator):
                 if distance <= least:
                     least, by, outward = distance, before + k, normal
             before += magnets.each.size(w)
+        if least > radius:
+            by, least = -1, ti.min(least, complete)
         return by, least, outward
 
     @ti.func

@@ -14,24 +14,20 @@ largest of them, and its amount is the shortest translation that separates the b
 
 Newton's step is (M_i + M_j + s)^-1 g in the plane normal to n. M is the second derivative of h, whose
 eigenvalues are the radii of curvature of the body at x, s = n . (c - x_i - x_j), and g is the tangential part
-of c - x_i - x_j. Flat faces have infinite radii: there h has a kink, across the plane in which a component of
-n is 0 in the frame of the body. Two measures suffice. Components a n of the support function are replaced by
-a sqrt(n^2 + KINK_WIDTH^2), and a step that fails by crossing a kink is cut at the kink, within which the next
-step of Newton finds the point of contact on the face.
+of c - x_i - x_j. Flat faces have infinite radii, and h has kinks there, which ``superquadric_points`` gives a
+small width. Three measures suffice. The step is first tried in the positions x (``superquadric_steps``). If
+that fails, it is made as it is, and if this fails by crossing a kink it is cut at the kink, within which the
+next step of Newton finds the point of contact on the face.
 """
 
 from tisim.backend.taichi import ti
-from tisim.numerics import elementary
 from tisim.numerics.vectors import conjugate, product, rotated, rotation_matrix
+from tisim.shapes.superquadric_points import constants, support
+from tisim.shapes.superquadric_steps import LARGEST_STEP, NOT_ZERO, step_in_positions
 
-KINK_WIDTH = 1e-11
-"""Width of the kinks of the support function, relative to the semi-axes. It changes the gap by less than
-twice this part of a semi-axis."""
 MOST_EVALUATIONS = 200
-"""Largest number of evaluations from one start; 4 to 12 are usual, up to 50 near
-flat faces, and more at depths that equal the sum of the radii of curvature."""
-LARGEST_STEP = 0.5
-"""Largest step of the normal (rad)."""
+"""Largest number of evaluations from one start; 3 to 8 are usual, and more near edges and at depths that
+equal the sum of the radii of curvature."""
 LEAST_RADIUS = 1e-2
 """Smallest sum of radii of curvature and gap that a step assumes if d is not concave, relative to the
 smallest semi-axis."""
@@ -48,15 +44,11 @@ LAST_INCREASE = 1e-18
 """Predicted increase of d at which the iteration ends, relative to the smallest semi-axis."""
 PLANE_ROUNDING = 4e-15
 """Rounding error of d, relative to the sum of all semi-axes and components of the separation."""
-NOT_ZERO = 1e-30
-"""A number that in place of 0 prevents a division by it, which f32 can represent."""
 DEEP_OVERLAP = 0.1
 """Depth of an overlap, relative to the smallest semi-axis, beyond which further starts are tried. Of 200,000
-random pairs, the first start missed the largest d of none up to a depth of 0.19 and of one in 100 at 0.4."""
-MOST_STARTS = 16
-"""The ellipsoid's normal, six axes, and nine products of axes."""
-MULTIPLIER_ROUNDS = 20
-"""Largest number of iterations for the multiplier of a support point; 0 to 4 are usual."""
+random pairs, the first start missed the largest d of none up to a depth of 0.21 and of one in 100 at 0.35."""
+MOST_STARTS = 17
+"""The sum of three normals, the ellipsoid's normal, six axes, and nine products of axes."""
 
 
 @ti.func
@@ -92,12 +84,15 @@ def closest_superquadrics(
     # All in the frame of i; the columns of ``turn`` are the axes of j.
     c, turn = rotated(conjugate(p_i), c0), rotation_matrix(product(conjugate(p_i), p_j))
     enough, size = ti.cast(far, ti.f64), ti.min(a_i.min(), a_j.min())
-    best, start = ti.cast(0.0, ti.f64), 0
+    # The first start of ellipsoids is the second of others.
+    initial = ti.static(1 if ellipsoids else 0)
+    best, start = ti.cast(0.0, ti.f64), initial
     n, x_i, x_j = 0.0 * c, 0.0 * c, 0.0 * c
-    while start < MOST_STARTS and (start == 0 or best < -DEEP_OVERLAP * size):
-        first = _start(c, turn, a_i, a_j, start)
-        value, normal, y_i, y_j = _ascend(ellipsoids, c, turn, a_i, g_i, a_j, g_j, first, enough)
-        if start == 0 or value > best:
+    while start < MOST_STARTS and (start == initial or best < -DEEP_OVERLAP * size):
+        # With steps in positions from all starts, one in a million deep overlaps missed the largest d.
+        first = _start(c, turn, a_i, g_i, a_j, g_j, start)
+        value, normal, y_i, y_j = _ascend(ellipsoids, c, turn, a_i, g_i, a_j, g_j, first, enough, start == 0)
+        if start == initial or value > best:
             best, n, x_i, x_j = value, normal, y_i, y_j
         start += 1
     gap = 0.0 * separation[0]
@@ -108,23 +103,16 @@ def closest_superquadrics(
 
 
 @ti.func
-def farthest_point(ellipsoids: ti.template(), direction, semi_axes, exponents):  # type: ignore[valid-type]
-    """Return the point (m, f64) of a superquadric that is farthest along a unit vector (f64), in the frame of
-    the body."""
-    a, g = ti.cast(semi_axes, ti.f64), ti.cast(exponents, ti.f64)
-    _h, x, _d, _v, _f = _support(ellipsoids, direction, _constants(ellipsoids, a, g))
-    return x
-
-
-@ti.func
-def _start(c, turn, a_i, a_j, start):
+def _start(c, turn, a_i, g_i, a_j, g_j, start):
     """Return one of the directions from which the normal is sought, in the half space of c.
 
-    The first is normal to an ellipsoid around the sum of both bodies, n ~ (A_i^2 + A_j^2)^-1 c, and exact for
-    two spheres. The others are the normals of faces of boxes: the axes of i, those of j, and their products.
+    The second is normal to an ellipsoid around the sum of both bodies, n ~ (A_i^2 + A_j^2)^-1 c, and exact
+    for two spheres. The first is the sum of this one and of the normals of both bodies in the directions in
+    which the ellipsoids touch, A_i^2 n and A_j^2 n. The others are the normals of faces of boxes: the axes of
+    i, the axes of j, and their products.
     """
     n = c
-    kind, first = (start + 2) // 3, (start + 2) % 3
+    kind, axis = (start + 1) // 3, (start + 1) % 3
     if kind == 0:
         square_i, square_j, back = a_i * a_i, a_j * a_j, turn.transpose()
         rows = [
@@ -132,16 +120,34 @@ def _start(c, turn, a_i, a_j, start):
         ]
         # By Cramer's rule, without the determinant, which is positive.
         n = c[0] * rows[1].cross(rows[2]) + c[1] * rows[2].cross(rows[0]) + c[2] * rows[0].cross(rows[1])
+        if start == 0:
+            n = n / ti.max(n.norm(), NOT_ZERO)
+            n += _normal_near(a_i * n, a_i, g_i) + turn @ _normal_near(a_j * (back @ n), a_j, g_j)
     elif kind == 1:
-        n = _unit(c, first)
+        n = _unit(c, axis)
     elif kind == 2:
-        n = turn @ _unit(c, first)
+        n = turn @ _unit(c, axis)
     else:
-        n = _unit(c, first).cross(turn @ _unit(c, kind - 3))
+        n = _unit(c, axis).cross(turn @ _unit(c, kind - 3))
     side = ti.select(n.dot(c) < 0.0, -1.0, 1.0)
     size = n.norm()
     up = ti.Vector([0.0 * size, 0.0 * size, 1.0 + 0.0 * size])
     return ti.select(size > 0.0, side / ti.select(size > 0.0, size, 1.0) * n, up)
+
+
+@ti.func
+def _normal_near(u, a, g):
+    """Return nearly the unit normal of a body in the direction of the point a_k u_k from its centre.
+
+    Exponents above 5 are replaced by 5, and |u|^(g - 1) is interpolated between whole powers.
+    """
+    size = 1.0 / ti.max(ti.abs(u).max(), NOT_ZERO)
+    n = g / a * u
+    for k in ti.static(range(3)):
+        for whole in ti.static(range(2, 5)):
+            part = ti.min(ti.max(g[k] - whole, 0.0), 1.0)
+            n[k] *= 1.0 - part + part * size * ti.abs(u[k])
+    return n / ti.max(n.norm(), NOT_ZERO)
 
 
 @ti.func
@@ -152,20 +158,23 @@ def _unit(like, k):
 
 
 @ti.func
-def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):  # type: ignore[valid-type]
+def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far, in_positions):  # type: ignore[valid-type]
     """Return a maximum of d (m), its normal, and the points of contact relative to both centres (m), in the
-    frame of i."""
+    frame of i.
+
+    in_positions : whether steps are first tried in the positions of the points of contact.
+    """
     size = ti.min(a_i.min(), a_j.min())
     noise = PLANE_ROUNDING * (a_i.sum() + a_j.sum() + ti.abs(c).sum())
     back = turn.transpose()
-    body_i, body_j = _constants(ellipsoids, a_i, g_i), _constants(ellipsoids, a_j, g_j)
-    normal, trial, step = start, start, 0.0 * start
+    body_i, body_j = constants(ellipsoids, a_i, g_i), constants(ellipsoids, a_j, g_j)
+    normal, trial, step, change = start, start, 0.0 * start, 0.0 * start
     x_i, x_j = 0.0 * c, 0.0 * c
     value, predicted, part = 0.0 * size, 0.0 * size, 0.0 * size
-    pending, rounds = 1, 0
+    pending, rounds, bent = 1, 0, 0
     while pending == 1 and rounds < MOST_EVALUATIONS:
-        h_i, s_i, d_i, v_i, f_i = _support(ellipsoids, trial, body_i)
-        h_j, s_j, d_j, v_j, f_j = _support(ellipsoids, back @ trial, body_j)
+        h_i, s_i, d_i, v_i, f_i = support(ellipsoids, trial, body_i)
+        h_j, s_j, d_j, v_j, f_j = support(ellipsoids, back @ trial, body_j)
         d = c.dot(trial) - h_i - h_j
         if rounds == 0 or d >= value + REQUIRED_SHARE * part * predicted - noise:
             normal, value = trial, d
@@ -205,6 +214,17 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
                 x_i = s_i + d_i * step - f_i * v_i.dot(step) * v_i
                 x_j = turn @ (-s_j - d_j * step_j + f_j * v_j.dot(step_j) * v_j)
                 normal = _scaled_to_1(normal + step)
+            change, bent = part * step, 0
+            if ti.static(not ellipsoids):  # noqa: SIM102
+                if pending == 1 and in_positions:
+                    along, here, there = (
+                        part * ti.Vector([s_t, s_u]),
+                        (normal, d_i, g_i),
+                        (back @ normal, d_j, g_j),
+                    )
+                    change, bent = step_in_positions(along, (t, u), (t_j, u_j), here, there)
+        elif bent == 1:
+            change, bent = part * step, 0
         else:
             # The nearest kink that the step crosses, of either body.
             limit, nearest = part, ti.cast(2.0, ti.f64)
@@ -215,7 +235,8 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
                     inside = (at > CLOSE_KINK * limit) & (at < FAR_KINK * limit)
                     nearest = ti.min(nearest, ti.select(inside, at, 2.0))
             part = ti.select(nearest < 1.0, nearest, STEP_CUT * limit)
-        trial = _scaled_to_1(normal + part * step)
+            change = part * step
+        trial = _scaled_to_1(normal + change)
         rounds += 1
     return value, normal, x_i, x_j
 
@@ -224,74 +245,3 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far):
 def _scaled_to_1(v):
     """Return a vector divided by its length."""
     return 1.0 / v.norm() * v
-
-
-@ti.func
-def _constants(ellipsoids: ti.template(), a, g):  # type: ignore[valid-type]
-    """Return the numbers that the support function of a body reads: a_k^2 for an ellipsoid; otherwise
-    ln(a_k/g_k), g_k and 1/(g_k - 1)."""
-    scale, inverse = a * a, 0.0 * a
-    if ti.static(not ellipsoids):
-        scale = ti.Vector([elementary.log(a[k] / g[k]) for k in ti.static(range(3))])
-        inverse = 1.0 / (g - 1.0)
-    return scale, g, inverse
-
-
-@ti.func
-def _support(ellipsoids: ti.template(), n, body):  # type: ignore[valid-type]
-    """Return h(n) (m), the farthest point x along a unit vector n (m), and d, v and f of its derivative
-    dx/dn = diag(d) - f v v^T (m).
-
-    For an ellipsoid h^2 = sum_k (a_k n_k)^2. In general the farthest point is at
-
-        |x_k/a_k| = u_k = (w_k/(g_k m))^(1/(g_k - 1)),    w_k = a_k sqrt(n_k^2 + KINK_WIDTH^2)
-
-    and h = sum_k w_k u_k, with m such that the point is on the surface: with p_k = g_k/(g_k - 1),
-
-        sum_k e_k = 1,    e_k = (w_k/(g_k m))^p_k,    w_k u_k = m g_k e_k
-
-    ln m follows by Newton's method, for equal exponents in one step. With q_k = 1/(g_k - 1) and y_k = w_k
-    u_k/(n_k^2 + KINK_WIDTH^2),
-
-        x_k = y_k n_k,    d_k = y_k (q_k n_k^2 + KINK_WIDTH^2)/(n_k^2 + KINK_WIDTH^2)
-        v_k = q_k x_k,    1/f = sum_k q_k w_k u_k
-    """
-    scale, g, q = body
-    h, f, x, d, v = 0.0 * n[0], 0.0 * n[0], 0.0 * n, 0.0 * n, 0.0 * n
-    if ti.static(ellipsoids):
-        h = ti.sqrt((scale * n).dot(n))
-        inverse = 1.0 / h
-        x, d = inverse * scale * n, inverse * scale
-        v, f = x, inverse
-    else:
-        width = KINK_WIDTH * KINK_WIDTH
-        square = n * n + width
-        p = g * q
-        logs = scale + 0.5 * ti.Vector([elementary.log(square[k]) for k in ti.static(range(3))])
-        log_m = logs.max()
-        e = ti.Vector([elementary.exp(p[k] * (logs[k] - log_m)) for k in ti.static(range(3))])
-        if g[0] == g[1] and g[1] == g[2]:
-            total = e.sum()
-            log_m += elementary.log(total) / p[0]
-            e *= 1.0 / total
-        else:
-            searching, rounds = 1, 0
-            while searching == 1 and rounds < MULTIPLIER_ROUNDS:
-                total = e.sum()
-                change = elementary.log(total) * total / p.dot(e)
-                log_m += change
-                if change < 1e-6:
-                    # To second order this is exact to rounding.
-                    e *= 1.0 - p * change * (1.0 - 0.5 * p * change)
-                    searching = 0
-                else:
-                    e = ti.Vector([elementary.exp(p[k] * (logs[k] - log_m)) for k in ti.static(range(3))])
-                rounds += 1
-        heights = elementary.exp(log_m) * g * e
-        h = heights.sum()
-        inverse = 1.0 / square
-        y = heights * inverse
-        x = y * n
-        d = y * (q * n * n + width) * inverse
-        v, f = q * x, 1.0 / q.dot(heights)
-    return h, x, d, v, f

@@ -25,5 +25,6 @@ from .pore_flow.stokes_flow import StokesFlow as StokesFlow
 from .pore_flow.stokes_flow import permeability_tensor as permeability_tensor
 from .pore_flow.stokes_flow import stokes_flow as stokes_flow
 from .sampling import sample as sample
+from .switched import Switched as Switched
 from .uniform import ElectricField as ElectricField
 from .uniform import MagneticField as MagneticField

@@ -74,6 +74,9 @@ def check_step(s, w, i, dt, path, force, torque, turns: ti.template(), patient: 
         twisted = per_torque * ((torque - s.torque_before[w, i]).norm() / radius)
         fails = fails or twisted > STEP_LIMIT * turned + per_torque * (torque.norm() / radius)
         excess = ti.max(excess, twisted / turned)
+    if ti.static(hasattr(s, "fixed")):
+        # An operator may have fixed it in this step, which ends all force on it.
+        fails = fails and s.fixed[w, i] == 0
     if ti.static(patient):
         again = s.strained[w, i] > 0.0
         s.strained[w, i] = ti.select(fails, 1.0, 0.0)

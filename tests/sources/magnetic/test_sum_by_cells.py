@@ -6,10 +6,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.sources.fields import fields
-from tisim import InputError
+from tisim import InputError, Particles, Scene, run
+from tisim.operators import Capture
 from tisim.sources import Cylinder, MagneticCylinders, sample
 from tisim.sources.magnetic import cell_sum, cylinder_rows
 from tisim.sources.magnetic.local_expansions import gaps
+from tisim.steppers import FixedStep, Verlet
 
 SATURATION = 985e3
 FIBRE = {"radius": 2e-4, "length": 4e-3}
@@ -196,3 +198,33 @@ def test_single_precision(single):
     three, four = single("sources.magnetic.test_sum_by_cells", "in_this_precision")
     assert three < 1e-3
     assert four < 1e-4
+
+
+@pytest.mark.long
+def test_particles_touch_the_same_cylinders_as_without_cells(rng):
+    """Some cylinders have no field, so they belong to no expansion; particles are smaller and larger than
+    cells."""
+    cylinders = fibres(rng, 40)
+    cylinders = tuple(
+        one.model_copy(update={"magnetisation": (0.0, 0.0, 0.0)}) if k % 3 == 0 else one
+        for k, one in enumerate(cylinders)
+    )
+    points = about(rng, cylinders, 60)
+    radius = np.resize([1e-7, 1e-5, 1e-4, 1e-3], len(points))
+    found = [
+        run(
+            Scene(
+                particles=Particles(
+                    position=points, velocity=np.zeros_like(points), radius=radius, density=1e3
+                ),
+                effects=(MagneticCylinders(cylinders=cylinders, sum_digits=digits), Capture()),
+                duration=1e-3,
+                stepper=Verlet(control=FixedStep(dt=1e-3)),
+            )
+        )
+        for digits in (None, 2)
+    ]
+    assert 60 < found[0].work["captures"] < len(points)
+    assert (found[0].state["captured_by"] % 3 == 0).any()
+    for name in ("captured_by", "position"):
+        np.testing.assert_array_equal(found[1].state[name], found[0].state[name])

@@ -18,7 +18,7 @@ LOW, HIGH = (-1 * MM, 0.0, 2 * MM), (1 * MM, 1.5 * MM, 4 * MM)
 FIBRE = Cylinder(centre=(0.1 * MM, 0.7 * MM, 3.1 * MM), axis=(2, 1, -2), radius=0.35 * MM, length=1.5 * MM)
 BALL = Sphere(centre=(-0.9 * MM, 1.4 * MM, 2.1 * MM), radius=0.3 * MM)
 SETUP = {
-    "low": LOW, "high": HIGH, "cells": (16, 12, 18), "viscosity": 1e-3, "speed": 2e-3,
+    "low": LOW, "high": HIGH, "cells": (16, 12, 16), "viscosity": 1e-3, "speed": 2e-3,
     "cylinders": (FIBRE,), "spheres": (BALL,),
 }  # fmt: skip
 SIDES = np.subtract(HIGH, LOW)
@@ -28,13 +28,17 @@ def flow(**changes):
     return PoreFlow(**{**SETUP, **changes})
 
 
-def solved(cells=(16, 12, 18), fall=(0.0, 0.0, 1.0), viscosity=1e-3):
+BODIES = [
+    SolidCylinder(FIBRE.centre, FIBRE.direction, FIBRE.radius, FIBRE.length),
+    SolidSphere(BALL.centre, BALL.radius),
+]
+LAYER = 2 / 16 * MM
+"""One cell, m; cells are 2/16 mm, 1.5/12 mm and 2/16 mm."""
+
+
+def solved(cells=(16, 12, 16), fall=(0.0, 0.0, 1.0), viscosity=1e-3):
     """The same matrix given to the solver."""
-    bodies = [
-        SolidCylinder(FIBRE.centre, FIBRE.direction, FIBRE.radius, FIBRE.length),
-        SolidSphere(BALL.centre, BALL.radius),
-    ]
-    return stokes_flow(bodies, LOW, HIGH, cells, tuple(-np.array(fall)), viscosity)
+    return stokes_flow(BODIES, LOW, HIGH, cells, tuple(-np.array(fall)), viscosity)
 
 
 def close():
@@ -57,36 +61,69 @@ def splines(found, points):
     return velocity
 
 
-def test_velocity_between_faces_is_that_of_basis_splines(rng):
-    points = np.array(LOW) + SIDES * rng.uniform(-1.5, 2.5, (300, 3))
-    found = solved()
-    expected = splines(found, points) * 2e-3 / found.mean_velocity[2]
+def depth(points):
+    """Distances from surfaces in layers, interpolated linearly between the corners of cells."""
+    grid = solved().grid
+    hat = BSpline.basis_element([-1, 0, 1], extrapolate=False)
+    weights = []
+    for b, n in enumerate(grid.shape):
+        apart = ((points[:, b] - LOW[b]) / grid.spacing[b])[:, None] - np.arange(n)
+        weights.append(np.nan_to_num(hat((apart + n / 2) % n - n / 2)))
+    corners = np.minimum(grid.distances(None, BODIES) / LAYER, 3)
+    return np.einsum("pi,pj,pk,ijk->p", *weights, corners)
+
+
+def reference(points, h=1e-9):
+    """Velocities at a superficial velocity of 2 mm/s, with the layer at surfaces."""
+    found, near = solved(), depth(points)
+    normal = np.stack([depth(points + h * e) - depth(points - h * e) for e in np.eye(3)], axis=1)
+    normal /= np.linalg.norm(normal, axis=1)[:, None] + 1e-300
+    part = np.clip(near, 0, 1)[:, None]
+    v = splines(found, points + (1 - part) * LAYER * normal) * 2e-3 / found.mean_velocity[2]
+    across = (v * normal).sum(axis=1)[:, None] * normal
+    return np.where(part < 1, part * (v - across) + part**2 * across, v)
+
+
+def test_velocity_between_faces_is_that_of_basis_splines_and_vanishes_at_surfaces(rng):
+    points = np.array(LOW) + SIDES * rng.uniform(-1.5, 2.5, (500, 3))
+    layer = (depth(points) > 0) & (depth(points) < 1)
+    assert layer.sum() > 50
+    assert (depth(points) < 0).sum() > 30
     velocity, _ = sample((flow(),), "flow_velocity", points)
-    np.testing.assert_allclose(velocity, expected, atol=30 * close() * 2e-3)
+    np.testing.assert_allclose(velocity, reference(points), atol=max(30 * close(), 1e-6) * 2e-3)
+    assert (velocity[depth(points) < -1e-3] == 0).all()
     images, _ = sample((flow(),), "flow_velocity", points + SIDES * [3, -2, 1])
     np.testing.assert_allclose(images, velocity, atol=100 * close() * 2e-3)
 
 
-def test_the_gradient_is_the_derivative_and_has_no_trace(rng):
-    points = np.array(LOW) + SIDES * rng.uniform(-1, 2, (300, 3))
+def test_the_gradient_is_the_derivative_and_has_no_trace_beyond_the_layer(rng):
+    points = np.array(LOW) + SIDES * rng.uniform(-1, 2, (500, 3))
     _, gradient = sample((flow(),), "flow_velocity", points)
-    scale = abs(gradient).max()
-    assert abs(np.trace(gradient, axis1=1, axis2=2)).max() < 30 * close() * scale
-    found, h = solved(), 1e-5 * MM
+    scale, h = abs(gradient).max(), 1e-5 * MM
+    trace = abs(np.trace(gradient, axis1=1, axis2=2))
+    beyond = depth(points) > 1.01
+    assert trace[beyond].max() < 30 * close() * scale
+    wrong, divergence = np.zeros(len(points)), np.zeros(len(points))
     for b, step in enumerate(h * np.eye(3)):
-        slope = (splines(found, points + step) - splines(found, points - step)) / (2 * h)
-        expected = slope * 2e-3 / found.mean_velocity[2]
-        # Derivatives jump at few of the points.
-        wrong = abs(gradient[..., b] - expected).max(axis=1)
-        assert np.quantile(wrong, 0.98) < max(1e-6, 30 * close()) * scale
+        slope = (reference(points + step) - reference(points - step)) / (2 * h)
+        wrong = np.maximum(wrong, abs(gradient[..., b] - slope).max(axis=1))
+        divergence += slope[:, b]
+    # Derivatives jump at few of the points.
+    assert np.quantile(wrong[beyond], 0.98) < max(1e-6, 30 * close()) * scale
+    # Without the curvature of surfaces, whose radius is 3 layers.
+    inside = (depth(points) > 0.01) & ~beyond
+    steep = np.sqrt((gradient[inside] ** 2).sum(axis=(1, 2)).mean())
+    assert np.sqrt((divergence[inside] ** 2).mean()) < 0.35 * steep
+    assert np.sqrt((wrong[inside] ** 2).mean()) < 0.15 * scale
 
 
 def test_the_mean_over_the_box_is_the_superficial_velocity():
-    places = [np.array(LOW)[b] + SIDES[b] * (np.arange(n) + 0.37) / n for b, n in enumerate((16, 12, 18))]
+    places = [np.array(LOW)[b] + SIDES[b] * (np.arange(n) + 0.37) / n for b, n in enumerate((16, 12, 16))]
     points = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, 3)
     velocity, _ = sample((flow(),), "flow_velocity", points)
     mean = solved().mean_velocity
-    np.testing.assert_allclose(velocity.mean(axis=0), mean / mean[2] * 2e-3, atol=10 * close() * 2e-3)
+    # Splines keep it; the layer at surfaces, 1.3 cells of a fibre 5.6 cells thick, takes a little away.
+    np.testing.assert_allclose(velocity.mean(axis=0), mean / mean[2] * 2e-3, atol=0.03 * 2e-3)
 
 
 def test_a_pressure_gradient_drives_by_darcys_law():
@@ -96,6 +133,7 @@ def test_a_pressure_gradient_drives_by_darcys_law():
     assert source.superficial_speed() == pytest.approx(found.mean_velocity[2], rel=1e-9)
     points = np.array([[0.0, 0.1 * MM, 2.2 * MM]])
     velocity, _ = sample((source,), "flow_velocity", points)
+    assert depth(points) > 1
     np.testing.assert_allclose(velocity, splines(found, points), rtol=1e3 * close())
 
 
@@ -115,7 +153,7 @@ def test_flows_of_one_matrix_are_solved_once(monkeypatch):
     )  # fmt: skip
     assert len({id(source.solve()) for source in same}) == 1
     assert len(solutions) == 1
-    for other in (flow(direction=(0, 1, 0)), flow(spheres=()), flow(cells=(16, 14, 18))):
+    for other in (flow(direction=(0, 1, 0)), flow(spheres=()), flow(cells=(16, 14, 16))):
         other.solve()
     assert len(solutions) == 4
     monkeypatch.setattr(pore_flow, "KEPT_BYTES", 1)
@@ -166,35 +204,33 @@ def test_walls_hold_the_fluid_and_space_beyond_is_at_rest():
     points = np.stack([0 * y, 0.6 * y, 0.8 * y], axis=-1)
     velocity, gradient = sample((tube,), "flow_velocity", points)
     expected = np.where(abs(y) < MM, 2 * MM * (1 - (y / MM) ** 2), 0)
-    # Velocities are linear between faces; the wall is within a cell, 0.05 mm.
-    near = abs(abs(y) - MM) < 0.06 * MM
-    np.testing.assert_allclose(velocity[~near, 0], expected[~near], atol=0.01 * MM)
-    np.testing.assert_allclose(velocity[near, 0], expected[near], atol=0.1 * MM)
-    beyond = abs(y) > 1.3 * MM
-    assert abs(velocity[beyond]).max() < 1e-4 * MM
-    assert abs(gradient[abs(y) > 2 * MM]).max() == 0
+    np.testing.assert_allclose(velocity[:, 0], expected, atol=0.012 * MM)
+    assert (velocity[abs(y) > 1.01 * MM] == 0).all()
+    assert (gradient[abs(y) > 1.01 * MM] == 0).all()
     assert abs(velocity[:, 1:]).max() < 1e-4 * MM
 
 
 def test_the_speed_at_a_surface_falls_with_the_spacing(rng):
-    """As a part of the superficial speed it is of first order, and vanishes a cell inside the body."""
+    """It is of second order, and particles that follow the fluid hardly cross a surface."""
     z = rng.uniform(-0.4, 0.4, 500)
     n = np.array(FIBRE.direction)
     e = np.cross(n, [1.0, 0, 0]) / np.linalg.norm(np.cross(n, [1.0, 0, 0]))
     around = 2 * np.pi * rng.uniform(size=500)
     out = np.cos(around)[:, None] * e + np.sin(around)[:, None] * np.cross(n, e)
-    slip = []
+    slip, through = [], []
     for m in (1, 2, 4):
         source = flow(cells=(16 * m, 12 * m, 16 * m))
         surface = FIBRE.centre + z[:, None] * FIBRE.length * n + FIBRE.radius * out
-        v = np.linalg.norm(sample((source,), "flow_velocity", surface)[0], axis=1) / 2e-3
-        slip.append(np.sqrt((v**2).mean()))
-        deep = surface - 1.75 * SIDES[0] / (16 * m) * out
-        v = np.linalg.norm(sample((source,), "flow_velocity", deep)[0], axis=1) / 2e-3
-        assert v.max() < 5e-3
-    assert slip[0] < 0.5
-    assert slip[1] < 0.65 * slip[0]
-    assert slip[2] < 0.65 * slip[1]
+        v = sample((source,), "flow_velocity", surface)[0] / 2e-3
+        slip.append(np.sqrt((v**2).sum(axis=1).mean()))
+        through.append(np.sqrt(((v * out).sum(axis=1) ** 2).mean()))
+        deep = surface - 0.05 * SIDES[0] / (16 * m) * out
+        assert abs(sample((source,), "flow_velocity", deep)[0]).max() < slip[-1] * 2e-3
+    assert slip[0] < 0.04
+    assert through[0] < 2e-3
+    for values in (slip, through):
+        assert values[1] < 0.4 * values[0]
+        assert values[2] < 0.4 * values[1]
 
 
 def test_bounds_hold():
@@ -202,7 +238,7 @@ def test_bounds_hold():
     points = np.array(LOW) + SIDES * np.random.default_rng(3).uniform(size=(2000, 3))
     velocity, gradient = sample((source,), "flow_velocity", points)
     assert np.linalg.norm(velocity, axis=1).max() <= source.strongest() < 10 * 2e-3 * 3
-    assert source.shortest_length() == pytest.approx(min(SIDES / (16, 12, 18)))
+    assert source.shortest_length() == pytest.approx(min(SIDES / (16, 12, 16)))
     assert flow(cells=(16, 12, 1), spheres=()).shortest_length() == pytest.approx(min(SIDES[:2] / (16, 12)))
     assert abs(gradient).max() > 0
 

@@ -312,7 +312,7 @@ WRONG = {
     "pores must be open along the pressure gradient at 8 x 8 x 8 cells, so that a fluid can flow through;"
     " received bodies and walls that block it": {"solids": [WALL]},
     "solids must be bodies, or a column with walls; received none": {"solids": []},
-    "cells must be so many that the thinnest body, of 0.1 m, spans at least 2 cells; received (8, 8, 8)": {
+    "cells must be fine enough for 2 of them across the thinnest body, of 0.1 m; received (8, 8, 8)": {
         "solids": [SolidSphere((0, 0, 0), 0.05)]
     },
     "cells must be three whole numbers, at least 1; received (8, 8)": {"cells": (8, 8)},

@@ -60,14 +60,14 @@ class HardBodies(Shaped, Pairwise):
         return self.size(s, w, i) * self.thickness(w, s.shape[w, i])
 
     @ti.func
-    def closest(self, s, w, i, j, separation):
+    def closest(self, s, w, i, j, separation, far):
         """Return the gap between two bodies (m, negative if they overlap), the unit normal from i to j, and
-        the points of contact (m), each relative to the centre of its body. The gap of bodies that do not
-        overlap may be a lower bound, not below 0.
+        the points of contact (m), each relative to the centre of its body. A gap wider than ``far`` may be a
+        lower bound, not below ``far``.
 
-        separation : centre of j minus centre of i (m).
+        separation : centre of j minus centre of i (m). far : m; negative where shallow overlaps do not count.
         """
-        return self.between(s, w, i, j, self.turn(s, w, i), self.turn(s, w, j), separation, 0.0)
+        return self.between(s, w, i, j, self.turn(s, w, i), self.turn(s, w, j), separation, far)
 
     @ti.func
     def end_count(self, s, w, i):

@@ -11,7 +11,8 @@ from tisim.effects.base import Shaped
 from tisim.numerics.vectors import conjugate, rotated
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.superquadric import SuperquadricShape
-from tisim.shapes.superquadric_pairs import closest_superquadrics, farthest_point
+from tisim.shapes.superquadric_pairs import closest_superquadrics
+from tisim.shapes.superquadric_points import farthest_point
 
 
 class Superquadrics(Shaped):

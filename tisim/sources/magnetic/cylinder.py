@@ -206,12 +206,13 @@ class MagneticCylinders(Magnets):
 
     @ti.func
     def nearby(self, w, r, radius):
-        first, end, listed = 0, self.each.size(w), False
+        first, end, listed, reach = 0, self.each.size(w), False, 0.0 * radius + ti.math.inf
         if ti.static(self.has_cells):
             leaf, _x, half = self.in_cells.leaf(w, r)
             if radius < NEAR_REACH * half:
                 first, end, listed = self.listed(w, leaf)
-        return first, end, listed
+                reach = ti.select(listed, NEAR_REACH * half, reach)
+        return first, end, listed, reach
 
     @ti.func
     def near_body(self, w, e):

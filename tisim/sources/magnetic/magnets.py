@@ -136,8 +136,9 @@ class Magnets(Switched):
     @ti.func
     def nearby(self, w, r, radius):
         """Return a range of places in the list of bodies near r (m), in which are all bodies that a sphere of
-        a radius (m) at r may touch, and whether the list is ``near_body``; otherwise places are indices."""
-        return 0, self.each.size(w), False
+        a radius (m) at r may touch; whether the list is ``near_body``, otherwise places are indices; and a
+        distance (m), at least the radius, within which no other body is, infinite if the range has all."""
+        return 0, self.each.size(w), False, 0.0 * radius + ti.math.inf
 
     @ti.func
     def near_body(self, w, e):

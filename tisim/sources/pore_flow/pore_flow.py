@@ -31,10 +31,13 @@ WHOLE_PERIODS = 1e-9
 class UnitFlow(NamedTuple):
     """A flow with a superficial velocity of 1 along its pressure gradient.
 
-    velocity : on faces, shape (3, nx, ny, nz). mean : superficial velocity, shape (3,). permeability : m^2.
+    velocity : on faces, shape (3, nx, ny, nz). distance : of the corners of cells from the nearest surface,
+        in units of ``PoreFlow.shortest_length``, shape (nx, ny, nz). mean : superficial velocity, shape (3,).
+        permeability : m^2.
     """
 
     velocity: np.ndarray
+    distance: np.ndarray
     mean: np.ndarray
     permeability: float
 
@@ -53,10 +56,15 @@ class PoreFlow(Source):
     velocity: scenes that differ in these only share a solution. The pore Reynolds number must be far below 1.
 
     Between the faces of the grid, quadratic splines along a component and linear ones across it give a
-    continuous velocity without divergence, so that a fluid with uniform density remains so. It vanishes
-    inside bodies, but only within a cell from their surface; at the surface itself it is of first order in
-    the spacing. Particles that are captured on contact should therefore be larger than a cell, or cells be
-    smaller than the layer around a body in which particles are captured.
+    continuous velocity V without divergence, so that a fluid with uniform density remains so. But splines do
+    not vanish at a surface. In a layer of one cell in front of it, of thickness b, the velocity at a distance
+    d is therefore taken from V at the distance b on the same normal n:
+
+        v = d/b V_t + (d/b)^2 V_n n,    d < b
+
+    V_t and V_n are the components of V along the surface and along its normal. A flow without slip and
+    without divergence has these powers, so that the divergence remains small. Distances are interpolated
+    linearly between the corners of cells. The gradient neglects the curvature of surfaces in this layer.
 
     The matrix continues periodically across the faces of the box, as do bodies that cross them. A flow with
     ``outside = "uniform"`` belongs to a filter in free space: outside of the box the fluid has the
@@ -101,12 +109,13 @@ class PoreFlow(Source):
     outside: Literal["periodic", "uniform"] = option(
         "velocity outside of the box: of its periodic images, or the superficial velocity", "periodic"
     )
-    tolerance: float = option(
-        "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
+    tolerance: float = parameter(
+        "", "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
     )
 
     if TYPE_CHECKING:
         grid: ClassVar[Any]
+        depth: ClassVar[Any]
         mean: ClassVar[Any]
         scale: ClassVar[Any]
 
@@ -164,7 +173,8 @@ class PoreFlow(Source):
             velocity = flow.velocity / along
             # Tiny numbers could not be stored in f32.
             velocity[np.abs(velocity) < 1e-30] = 0.0
-            _solved[key] = UnitFlow(velocity, flow.mean_velocity / along, flow.permeability)
+            distance = flow.grid.distances(None, solids) / self.shortest_length()
+            _solved[key] = UnitFlow(velocity, distance, flow.mean_velocity / along, flow.permeability)
         _solved.move_to_end(key)
         while len(_solved) > 1 and sum(one.velocity.nbytes for one in _solved.values()) > KEPT_BYTES:
             _solved.popitem(last=False)
@@ -201,7 +211,13 @@ class PoreFlow(Source):
 
     def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
         flow = self.solve()
-        return {"grid": flow.velocity.ravel(), "mean": flow.mean, "scale": [self.superficial_speed()]}
+        return {
+            "grid": flow.velocity.ravel(),
+            "depth": flow.distance.ravel(),
+            "mean": flow.mean,
+            "scale": [self.superficial_speed()],
+            "unit": [self.shortest_length()],
+        }
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -234,14 +250,60 @@ class PoreFlow(Source):
     def interpolate(self, w, r):
         """Return velocity (m/s) and gradient (1/s) at r (m)."""
         place, inside, per = self.place(w, r)
-        v, slope = 0.0 * r, 0.0 * r.outer_product(r)
+        near, normal, thickness = self.surface(w, place, per)
+        # In the layer, the velocity above r at its edge.
+        part = ti.min(ti.max(near, 0.0), 1.0)
+        place += (1.0 - part) * thickness * per * normal
+        v, slope = self.between(w, place, per)
+        along = v.dot(normal)
+        edge = v
+        v = part * edge + (part * part - part) * along * normal
+        if near < 1.0:
+            slope -= (slope @ normal).outer_product(normal)
+            slope = part * slope + (part * part - part) * normal.outer_product(normal @ slope)
+            rise = (edge + (2.0 * part - 1.0) * along * normal) / thickness
+            slope += ti.select(near > 0.0, rise, 0.0 * rise).outer_product(normal)
+        for a in ti.static(range(3)):
+            for b in ti.static(range(3)):
+                slope[a, b] = ti.select(inside, self.scale(w, 0) * slope[a, b], 0.0)
+            v[a] = self.scale(w, 0) * ti.select(inside, v[a], self.mean(w, a))
+        return v, slope
+
+    @ti.func
+    def surface(self, w, place, per):
+        """Return the distance of a place from the nearest surface, in layers, the unit vector along which it
+        increases, which is 0 far away, and the thickness of the layer (m)."""
+        corner = ti.floor(place)
+        x, first = place - corner, ti.cast(corner, ti.i32)
+        near, normal = 0.0 * x[0], 0.0 * x
+        n = ti.static(self.shape)
+        for i, j, k in ti.static(ti.ndrange(2, 2, 2)):
+            index = (self.wrapped(first[0] + i, 0) * n[1] + self.wrapped(first[1] + j, 1)) * n[2]
+            d = self.depth(w, index + self.wrapped(first[2] + k, 2))
+            p, q, s = x[0] if i else 1.0 - x[0], x[1] if j else 1.0 - x[1], x[2] if k else 1.0 - x[2]
+            near += p * q * s * d
+            normal[0] += (d if i else -d) * q * s
+            normal[1] += p * (d if j else -d) * s
+            normal[2] += p * q * (d if k else -d)
+        normal *= per
+        size = normal.norm()
+        normal *= ti.select(size > 0.0, 1.0 / ti.select(size > 0.0, size, 1.0), 0.0)
+        # One cell along the normal, of cells with different sides.
+        across = (per * normal).norm()
+        thickness = 1.0 / ti.select(across > 0.0, across, per.max())
+        return near * self.unit(w, 0) / thickness, normal, thickness
+
+    @ti.func
+    def between(self, w, place, per):
+        """Return velocity and gradient (1/m) from splines, in units of the superficial speed."""
+        v, slope = 0.0 * place, 0.0 * place.outer_product(place)
         for a in ti.static(range(3)):
             first, weight, change = self.splines(place, a)
-            for i in range(ti.static(3 if a == 0 else 2)):
+            for i in ti.static(range(3 if a == 0 else 2)):
                 x = self.wrapped(first[0] + i, 0)
-                for j in range(ti.static(3 if a == 1 else 2)):
+                for j in ti.static(range(3 if a == 1 else 2)):
                     y = self.wrapped(first[1] + j, 1)
-                    for k in range(ti.static(3 if a == 2 else 2)):
+                    for k in ti.static(range(3 if a == 2 else 2)):
                         z = self.wrapped(first[2] + k, 2)
                         n = ti.static(self.shape)
                         u = self.grid(w, ((a * n[0] + x) * n[1] + y) * n[2] + z)
@@ -250,8 +312,7 @@ class PoreFlow(Source):
                         slope[a, 1] += u * weight[0, i] * change[1, j] * weight[2, k]
                         slope[a, 2] += u * weight[0, i] * weight[1, j] * change[2, k]
             for b in ti.static(range(3)):
-                slope[a, b] *= ti.select(inside, self.scale(w, 0) * per[b], 0.0)
-            v[a] = self.scale(w, 0) * ti.select(inside, v[a], self.mean(w, a))
+                slope[a, b] *= per[b]
         return v, slope
 
     @ti.func

@@ -14,8 +14,8 @@ from tisim.components.component import Vector
 
 Column = Literal["none", "duct", "tube"]
 """The walls around a matrix: none; a rectangular duct; a round tube."""
-WINDOW_CELLS = 2
-"""Cells around a body in which distances from it are evaluated; walls need them in neighbouring cells."""
+WINDOW_CELLS = 3
+"""Cells around a body in which distances from it are evaluated."""
 
 
 class SolidBody(Protocol):
@@ -123,16 +123,19 @@ class Grid:
         )
         return x, y, z
 
-    def coordinates(self, component: int) -> list[np.ndarray]:
-        """Return the coordinates (m) along each axis of the faces with a component of the velocity."""
-        return [
-            self.low[b] + self.spacing[b] * (np.arange(n) + (0.0 if b == component else 0.5))
-            for b, n in enumerate(self.shape)
-        ]
+    def offset(self, component: int | None, axis: int) -> float:
+        """Return the coordinate (m) along an axis of the first face with a component of the velocity, or of
+        the first corner of a cell for None."""
+        return float(self.low[axis] + (0.0 if component in (axis, None) else 0.5 * self.spacing[axis]))
 
-    def distances(self, component: int, solids: Sequence[SolidBody]) -> np.ndarray:
-        """Return the distances (m) of the faces with a component from the nearest surface, negative in
-        bodies and walls, with the shape of the grid; a large distance far from all surfaces.
+    def coordinates(self, component: int | None) -> list[np.ndarray]:
+        """Return the coordinates (m) along each axis of the faces with a component, or of corners."""
+        return [self.offset(component, b) + self.spacing[b] * np.arange(n) for b, n in enumerate(self.shape)]
+
+    def distances(self, component: int | None, solids: Sequence[SolidBody]) -> np.ndarray:
+        """Return the distances (m) of the faces with a component, or of the corners of cells, from the
+        nearest surface, negative in bodies and walls, with the shape of the grid; a large distance beyond
+        ``WINDOW_CELLS`` from all surfaces.
 
         Bodies continue periodically, except through walls.
         """
@@ -146,13 +149,15 @@ class Grid:
                 least[own] = np.minimum(least[own], solid.distances(points - images))
         return least
 
-    def _windows(self, component: int, solid: SolidBody) -> Iterator[tuple[tuple[slice, ...], np.ndarray]]:
+    def _windows(
+        self, component: int | None, solid: SolidBody
+    ) -> Iterator[tuple[tuple[slice, ...], np.ndarray]]:
         """Yield the blocks of faces near a body and its periodic images, each with the shift (m) of the
         image."""
         low, high = solid.extent()
         blocks: list[list[tuple[slice, float]]] = []
         for b, n in enumerate(self.shape):
-            offset = self.low[b] + (0.0 if b == component else 0.5 * self.spacing[b])
+            offset = self.offset(component, b)
             first = int(np.floor((low[b] - offset) / self.spacing[b])) - WINDOW_CELLS
             last = int(np.ceil((high[b] - offset) / self.spacing[b])) + WINDOW_CELLS
             turns = range(first // n, last // n + 1) if not self.walled[b] else range(1)

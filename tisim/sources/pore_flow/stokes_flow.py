@@ -171,7 +171,7 @@ def permeability_tensor(
     """Return the permeability K of a periodic matrix in U = -K/eta grad p, m^2, shape (3, 3).
 
     It is symmetric and, if pores lead through the box along all axes, positive definite. U is the superficial
-    velocity. Parameters and errors are those of ``stokes_flow``.
+    velocity. See ``stokes_flow`` for the parameters and errors.
     """
     flows = [stokes_flow(solids, low, high, cells, g, 1.0, tolerance=tolerance) for g in -np.eye(3)]
     return np.stack([flow.mean_velocity for flow in flows], axis=1)
@@ -201,7 +201,7 @@ def _check_resolved(solids: Sequence[SolidBody], grid: Grid) -> None:
     used = np.array(grid.cells) > 1
     spacing = float(grid.spacing[used].min(initial=np.inf))
     thinnest = min((one.width for one in solids), default=math.inf)
-    rule = f"so many that the thinnest body, of {thinnest:g} m, spans at least {FEWEST_CELLS} cells"
+    rule = f"fine enough for {FEWEST_CELLS} of them across the thinnest body, of {thinnest:g} m"
     wide = thinnest >= FEWEST_CELLS * spacing * (1 - 1e-9) or not solids
     must(wide, "cells", rule, grid.cells)
 

@@ -55,10 +55,11 @@ class BodySum(PairSum):
         """Return the overlap (m) of two bodies, whether it counts, the normal from i to j, and the points of
         contact, in units of D of each body."""
         s = self.s
-        gap, normal, here, there = self.bodies.closest(s, w, i, j, separation)
         size_i = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
         size_j = self.bodies.size(s, w, j) * self.bodies.unit(w, 0)
-        counts = -gap > self.stepper.tolerance(w) * ti.min(size_i, size_j)
+        allowed = self.stepper.tolerance(w) * ti.min(size_i, size_j)
+        gap, normal, here, there = self.bodies.closest(s, w, i, j, separation, -allowed)
+        counts = -gap > allowed
         return -gap, counts, normal, here / size_i, there / size_j
 
     @ti.func
@@ -242,7 +243,7 @@ class SumSoftOverlaps(MotionSum):
     @ti.func
     def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         s = self.s
-        gap, normal, here, there = self.bodies.closest(s, w, i, j, separation)
+        gap, normal, here, there = self.bodies.closest(s, w, i, j, separation, 0.0)
         size_i = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
         size_j = self.bodies.size(s, w, j) * self.bodies.unit(w, 0)
         mean = 0.5 * (size_i + size_j)
