@@ -27,7 +27,7 @@ SPEEDS = (3e-5, 1e-4, 3e-4, 1e-3)
 """Superficial velocities, m/s."""
 RADII = 1e-9 * np.array([1.0, 2.5, 3.5, 4.5, 5.5, 7.0, 9.0, 20.0])
 """Edges of classes of magnetic radius, m."""
-INTERVALS = 40
+CURVE_INTERVALS = 40
 """Intervals of time of a breakthrough curve."""
 BLUE, RED, GREEN, PURPLE = "#4477aa", "#cc6677", "#228833", "#882255"
 
@@ -98,7 +98,7 @@ def dynamic(size: str) -> tuple[Figure, Result]:
             filter = stream(speed, size, flow=flow)
             results = runs(filter, FIGURE_STARTS)
             first = first or results[0]
-            edges = np.linspace(0.0, filter.duration, INTERVALS + 1)
+            edges = np.linspace(0.0, filter.duration, CURVE_INTERVALS + 1)
             exits = np.concatenate([one.state["exited_at"] for one in results])
             found = breakthrough_curve(exits, edges, len(exits), filter.feed)
             axis.stairs(found.value, edges, color=colour, lw=1.5, label=f"{flow} flow")
