@@ -15,7 +15,7 @@ from tisim.cases.packed_filter.checks import FAST, LONE_FIBRES, SLOW, WAITS, fre
 from tisim.cases.packed_filter.lone_fibre import lone_fibres
 from tisim.cases.packed_filter.measures import captured_by, captured_fraction, penetration
 from tisim.cases.packed_filter.pictures import caught
-from tisim.cases.packed_filter.scene import filter_of
+from tisim.cases.packed_filter.scene import Flow, filter_of
 from tisim.engine.batches import Progress
 from tisim.plotting.style import empty, letters, plain
 
@@ -117,7 +117,8 @@ def beside(size: str, progress: Progress) -> list[tuple[float, str, Mean]]:
     for k, speed in enumerate(SPEEDS):
         filter = stream(speed, size)
         matrix = filter.matrix
-        for flow, name in (("resolved", "matrix"), ("uniform", "matrix, uniform flow")):
+        flows: tuple[tuple[Flow, str], ...] = (("resolved", "matrix"), ("uniform", "matrix, uniform flow"))
+        for flow, name in flows:
             some = runs(replace(filter, flow=flow), FIGURE_STARTS)
             rows.append((speed, name, Mean.of([penetration(one) for one in some])))
         n, stages = matrix.density, matrix.depth * matrix.density ** (1 / 3)

@@ -65,6 +65,7 @@ MATRIX_SETTINGS = tuple(one.name for one in fields(Matrix))
 CLEAR = 1.001
 """Colloids start outside the fibres, enlarged by this factor."""
 Mode = Literal["static", "dynamic"]
+Flow = Literal["resolved", "uniform"]
 
 SEARCH: dict[str, Any] = {"options": {"population": 12}, "ensemble": {"confirm": 8}}
 """Settings of searches of every size."""
@@ -107,7 +108,7 @@ class PackedFilter:
     mutual: bool = True
     digits: int = FIELD_DIGITS
     speed: float = 1e-4
-    flow: Literal["resolved", "uniform"] = "resolved"
+    flow: Flow = "resolved"
     resolution: float = 5.0
     feed: float = 60.0
     field_end: float = NO_END
