@@ -136,7 +136,7 @@ def neighbours(rows: Sequence[tuple[float, str, Mean]]) -> Figure:
     figure = empty(6.2, 4.2)
     axis = figure.subplots()
     names = list(dict.fromkeys(name for _, name, _ in rows))
-    for name, colour in zip(names, (BLUE, RED, GREEN, PURPLE), strict=True):
+    for name, colour in zip(names, (BLUE, RED, GREEN, PURPLE), strict=False):
         some = [(1e3 * speed, mean.value, mean.half) for speed, other, mean in rows if other == name]
         axis.errorbar(*np.array(some).T, color=colour, marker="o", ms=3, capsize=2, label=name)
     axis.set(xscale="log", xlabel="superficial velocity (mm/s)", ylabel="penetration", ylim=(0, 1.02))

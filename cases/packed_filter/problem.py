@@ -14,6 +14,7 @@ independently of each other, and the pressure drop is proportional to the depth.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -57,15 +58,23 @@ MEANINGS = {
     "flux": "flux density of the applied field",
     "speed": "superficial velocity of the water",
 }
-SEARCHED = {"small": {"number": 100, "resolution": 3.0}, "default": {"number": 300, "resolution": 4.0}}
-"""Colloids of a run and cells over D of its flow, by size."""
+SEARCHED: dict[str, dict[str, Any]] = {
+    "small": {"number": 100, "cells": (24, 24, 48)},
+    "default": {"number": 300, "cells": (36, 36, 72)},
+}
+"""Colloids of a run and cells of its flow, by size. All designs have the same, so that a generation is one
+batch."""
+FEWEST_FIBRES = 30
+"""Least number of fibres of a design."""
 TRANSITS = 4.0
 """Duration of a run over the time in which the mean flow passes the whole length of the flow."""
 
 
-def designed(design: Mapping[str, float], seed: int, **settings: float) -> PackedFilter:
+def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedFilter:
     """Return the filter of a design; each seed has a packing of its own."""
-    matrix = Matrix(design["diameter"], design["aspect"], design["fraction"], seed=seed)
+    aspect, fraction = design["aspect"], design["fraction"]
+    width = np.cbrt(FEWEST_FIBRES * np.pi / 4 * aspect / fraction) / (aspect + 1)
+    matrix = Matrix(design["diameter"], aspect, fraction, seed=seed, width=max(Matrix.width, float(width)))
     speed = design.get("speed", SPEED)
     transit = (matrix.depth + 2 * matrix.length + matrix.diameter) / speed
     return PackedFilter(
@@ -74,9 +83,9 @@ def designed(design: Mapping[str, float], seed: int, **settings: float) -> Packe
         flux=design["flux"],
         speed=speed,
         feed=0.1 * transit,
-        number=int(settings["number"]),
-        resolution=settings["resolution"],
+        digits=2,
         duration=TRANSITS * transit,
+        **settings,
     )
 
 

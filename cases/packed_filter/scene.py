@@ -95,11 +95,11 @@ class PackedFilter:
     matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
     magnetise each other. digits : of the sum of their fields. speed : superficial velocity of the water, the
     volume flow over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform"
-    with the mean velocity in the pores.
-    resolution : cells of the resolved flow over D. feed : time until which colloids enter, s. field_end :
-    time at which the field is switched off, s. adhering : fraction of captured colloids that are never
-    released; None for captures that last for ever. mean_radius, polydispersity : of the colloids, m, and
-    relative. number : of colloids. duration : of the run, s.
+    with the mean velocity in the pores. resolution : cells of the resolved flow over D, unless ``cells``
+    along x, y and z are given. feed : time until which colloids enter, s. field_end : time at which the field
+    is switched off, s. adhering : fraction of captured colloids that are never released; None for captures
+    that last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
+    duration : of the run, s.
     """
 
     matrix: Matrix = field(default_factory=Matrix)
@@ -110,6 +110,7 @@ class PackedFilter:
     speed: float = 1e-4
     flow: Flow = "resolved"
     resolution: float = 5.0
+    cells: tuple[int, int, int] | None = None
     feed: float = 60.0
     field_end: float = NO_END
     adhering: float | None = None
@@ -212,7 +213,7 @@ class PackedFilter:
         flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed))
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
-            x, y, z = (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
+            x, y, z = self.cells or (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
             flow = PoreFlow(
                 low=(left, front, first),
                 high=(right, back, last),

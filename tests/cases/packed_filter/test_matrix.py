@@ -62,11 +62,9 @@ def test_all_images_near_the_matrix_are_there(bulk):
 
 
 def test_a_fraction_beyond_jamming_is_refused():
-    with pytest.raises(
-        InputError, match=r"fraction of fibres must be at most 0\.[45]\d\d for fibres"
-    ):
+    with pytest.raises(InputError, match=r"fraction of fibres must be at most 0\.[45]\d\d for fibres"):
         Matrix(aspect=2.0, fraction=0.6).fibres()
     with pytest.raises(
-        InputError, match="at which rods with their caps fill less than the space; received 0.9"
+        InputError, match=r"at which rods with their caps fill less than the space; received 0\.9"
     ):
         Matrix(aspect=2.0, fraction=0.9).fibres()

@@ -1,0 +1,131 @@
+"""Estimates from single fibres, measures and figures, from known results."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tisim import Box
+from tisim.analysis import Mean
+from tisim.cases.packed_filter import figures, pictures, problem
+from tisim.cases.packed_filter.lone_fibre import SIZE_CLASSES, LoneFibre
+from tisim.cases.packed_filter.matrix import Matrix
+from tisim.cases.packed_filter.measures import captured_fraction, missing, penetration, released_fraction
+from tisim.cases.packed_filter.scene import PackedFilter, filter_of
+
+
+def alone(captured_at, volume=2.0):
+    """Lone fibres around which colloids of all sizes start alike in a volume."""
+    captured = np.asarray(captured_at, float)
+    radius = np.tile(np.linspace(1e-9, 9e-9, captured.shape[1]), (len(captured), 1))
+    return LoneFibre(PackedFilter(), np.full(len(captured), volume), radius, captured)
+
+
+def test_independent_fibres_leave_an_exponential_part():
+    """One in four colloids of each size is captured at 1 s, another at 3 s: V = 0.5 and 1 m^3."""
+    number = 24 * SIZE_CLASSES
+    at = np.tile(np.resize([1.0, 3.0, -1.0, -1.0], number), (5, 1))
+    fibres = alone(at)
+    assert fibres.passed(0.5, 1.6).value == pytest.approx(1.0)
+    assert fibres.passed(2.0, 1.6).value == pytest.approx(np.exp(-1.6 * 0.5))
+    assert fibres.passed(4.0, 1.6).value == pytest.approx(np.exp(-1.6 * 1.0))
+    assert fibres.passed(4.0, 0.4, stages=7).value == pytest.approx((1 - 0.4) ** 7)
+    assert fibres.passed(4.0, 1.6).half == pytest.approx(0.0, abs=1e-12)
+
+
+def test_sizes_are_averaged_after_the_exponential():
+    """Only the larger half of the colloids is captured, all of it within 2 m^3."""
+    number = 24 * SIZE_CLASSES
+    at = np.tile(np.where(np.arange(number) < number // 2, -1.0, 1.0), (4, 1))
+    assert alone(at).passed(2.0, 1.5).value == pytest.approx(0.5 + 0.5 * np.exp(-3.0))
+
+
+def test_the_interval_is_that_of_independent_fibres():
+    """Fibres of which each captures all or nothing: the half-width is that of their mean, to first order."""
+    number = 24 * SIZE_CLASSES
+    at = np.array([[1.0] * number if k % 2 else [-1.0] * number for k in range(40)])
+    found, n = alone(at, 1.0).passed(2.0, 0.1), 0.1
+    spread = Mean.of([float(k % 2) for k in range(40)]).half
+    assert found.half == pytest.approx(n * np.exp(-0.05) * spread, rel=0.02)
+
+
+def ended(captured_by, counts=None, entered=None, exited=None, radius=5e-9, depth=2e-3):
+    """The end of a run with a matrix of a depth (m)."""
+    n = len(captured_by)
+    state = {
+        "mass": np.ones(n), "radius": np.full(n, radius) if np.isscalar(radius) else np.array(radius),
+        "captured_by": np.array(captured_by), "captured_at": np.where(np.array(captured_by) >= 0, 5.0, -1.0),
+        "entered_at": np.zeros(n) if entered is None else np.array(entered, float),
+        "exited_at": np.full(n, -1.0) if exited is None else np.array(exited, float),
+        "entry_trials": np.ones(n, int),
+    }  # fmt: skip
+    if counts is not None:
+        state["capture_count"] = np.array(counts)
+    captures = int((np.array(captured_by) >= 0).sum() if counts is None else sum(counts))
+    held = int((np.array(captured_by) >= 0).sum())
+    work = {
+        "captures": captures, "releases": captures - held, "entered": int((state["entered_at"] >= 0).sum()),
+        "exited": int((state["exited_at"] >= 0).sum()),
+    }  # fmt: skip
+    box = Box(low=(-1e-3, -1e-3, 0), high=(1e-3, 1e-3, depth), periodic=(True, True, False), images=False)
+    return SimpleNamespace(state=state, work=work, scene=SimpleNamespace(domain=box, effects=()))
+
+
+def test_measures_count_colloids_that_have_entered():
+    """Of five colloids one waits, one is held, one was released and is out, one has passed, one is free."""
+    result = ended([-1, 3, -1, -1, -1], [0, 1, 2, 0, 0], entered=[-1, 0, 0, 0, 0], exited=[-1, -1, 9, 8, -1])
+    assert captured_fraction(result) == 0.25
+    assert captured_fraction(result, 4.0) == 0.0
+    assert penetration(result) == 0.5
+    assert released_fraction(result) == pytest.approx(2 / 3)
+    assert missing([result]) == 0
+    result.work["exited"] += 1
+    assert missing([result]) == 1
+
+
+def test_objectives_are_taken_to_one_depth():
+    """Half of the colloids pass 2 mm, so 2^-5 pass 10 mm; of the large ones a quarter, of the small 3/4."""
+    radius = [1e-9, 8e-9] * 4
+    result = ended([-1, 1, 2, 3, -1, 4, -1, -1], radius=radius)
+    assert problem.captured(result) == pytest.approx(1 - 0.5**5)
+    assert problem.selectivity(result) == pytest.approx((1 - 0.25**5) - (1 - 0.75**5))
+
+
+def test_designs_have_enough_fibres_and_one_grid():
+    """All filters of a generation have the same grid and number of colloids, so that they are one batch."""
+    low = {"diameter": 0.8e-3, "aspect": 1.5, "fraction": 0.05, "flux": 0.1}
+    high = {"diameter": 0.2e-3, "aspect": 5.0, "fraction": 0.35, "flux": 1.5}
+    first, second = (problem.designed(one, 0, **problem.SEARCHED["small"]) for one in (low, high))
+    assert first.matrix.number >= problem.FEWEST_FIBRES
+    assert (first.cells, first.number) == (second.cells, second.number)
+    assert first.matrix.side >= 2 * (first.matrix.length + first.matrix.diameter)
+    faster = problem.designed({**high, "speed": 1e-3}, 0, **problem.SEARCHED["small"])
+    assert faster.duration == pytest.approx(second.duration * problem.SPEED / 1e-3)
+
+
+def test_quaternions_turn_z_to_directions(rng):
+    axes = np.concatenate([rng.normal(size=(20, 3)), np.eye(3), -np.eye(3)])
+    turned = Rotation.from_quat(pictures.turns_to(axes), scalar_first=True).apply([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(turned, axes / np.linalg.norm(axes, axis=1)[:, None], atol=1e-12)
+
+
+def test_figure_of_estimates_and_its_table():
+    rows = [
+        (speed, name, Mean(0.1 * k, 0.01))
+        for k, speed in enumerate((1e-4, 1e-3))
+        for name in ("matrix", "cascade")
+    ]
+    axis = figures.neighbours(rows).axes[0]
+    assert [one.get_label() for one in axis.containers] == ["matrix", "cascade"]
+    assert list(axis.containers[0].lines[0].get_xdata()) == pytest.approx([0.1, 1.0])
+    assert figures.table(rows).splitlines()[1] == "0.0001,matrix,0.0,0.01"
+
+
+def test_sizes_give_the_settings_of_matrix_and_filter():
+    made = filter_of("small", seed=4, flux=0.5, aspect=3.0)
+    assert made.matrix == Matrix(aspect=3.0, seed=4)
+    assert (made.flux, made.number, made.mode) == (0.5, 200, "dynamic")
+    assert made.with_packing(7).matrix == replace(made.matrix, seed=7)
+    assert filter_of("small", "static").adhering is None
