@@ -136,7 +136,7 @@ def report(found: np.ndarray) -> None:
 
 def draw(found: np.ndarray, file: Path) -> None:
     """Draw a plane of the flow, and k by packing fraction."""
-    figure = style.empty(10, 4.4)
+    figure = style.empty(11, 4.4)
     left, right = figure.subplots(1, 2)
     slice_of_flow(figure, left)
     phi = np.linspace(0.04, 0.45, 200)
@@ -180,8 +180,8 @@ def slice_of_flow(figure, axes) -> None:
     axes.set_xlim(places[0], places[-1])
     axes.set_ylim(places[0], places[-1])
     axes.set_xlabel("x / side")
-    axes.set_ylabel("z / side, along the mean flow")
-    figure.colorbar(image, ax=axes, label="speed in the plane / superficial speed")
+    axes.set_ylabel("z / side (mean flow)")
+    figure.colorbar(image, ax=axes, label="speed / superficial speed")
 
 
 def main() -> None:
