@@ -106,7 +106,7 @@ def stokes_flow(
     column : walls at the faces of the box around ``axis`` (0, 1 or 2): "duct", or "tube" for a round tube
         that touches them. The pressure gradient is then along this axis.
     tolerance : velocity at walls over the mean velocity, as root mean square, at which iterations end. The
-        relative error of the permeability is far smaller, because it is quadratic.
+        relative error of the permeability by it is less than 100 times its square.
     progress : called with the finished part, 0..1.
 
     The equations of a staggered grid are solved by conjugate gradients for the forces at walls; see
