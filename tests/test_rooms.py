@@ -51,7 +51,11 @@ def test_modules_of_a_case_do_not_import_its_package():
     assert not [m for m, home in homes.items() if home in CASES and home in EARLY[m] | LATE[m]]
 
 
-SEQUELS = {"tisim.cases.cascade": "tisim.cases.capture", "tisim.cases.spin_up": "tisim.cases.coalescence"}
+SEQUELS = {
+    "tisim.cases.cascade": "tisim.cases.capture",
+    "tisim.cases.packed_filter": "tisim.cases.packing",
+    "tisim.cases.spin_up": "tisim.cases.coalescence",
+}
 """Cases that continue another case, and say so in the docstrings of their scenes."""
 
 

@@ -15,7 +15,7 @@ from tisim.cases.packed_filter.checks import FAST, LONE_FIBRES, SLOW, WAITS, fre
 from tisim.cases.packed_filter.lone_fibre import lone_fibres
 from tisim.cases.packed_filter.measures import captured_by, captured_fraction, penetration
 from tisim.cases.packed_filter.pictures import caught
-from tisim.cases.packed_filter.scene import filter_of
+from tisim.cases.packed_filter.scene import Flow, filter_of
 from tisim.engine.batches import Progress
 from tisim.plotting.style import empty, letters, plain
 
@@ -27,7 +27,7 @@ SPEEDS = (3e-5, 1e-4, 3e-4, 1e-3)
 """Superficial velocities, m/s."""
 RADII = 1e-9 * np.array([1.0, 2.5, 3.5, 4.5, 5.5, 7.0, 9.0, 20.0])
 """Edges of classes of magnetic radius, m."""
-INTERVALS = 40
+CURVE_INTERVALS = 40
 """Intervals of time of a breakthrough curve."""
 BLUE, RED, GREEN, PURPLE = "#4477aa", "#cc6677", "#228833", "#882255"
 
@@ -98,7 +98,7 @@ def dynamic(size: str) -> tuple[Figure, Result]:
             filter = stream(speed, size, flow=flow)
             results = runs(filter, FIGURE_STARTS)
             first = first or results[0]
-            edges = np.linspace(0.0, filter.duration, INTERVALS + 1)
+            edges = np.linspace(0.0, filter.duration, CURVE_INTERVALS + 1)
             exits = np.concatenate([one.state["exited_at"] for one in results])
             found = breakthrough_curve(exits, edges, len(exits), filter.feed)
             axis.stairs(found.value, edges, color=colour, lw=1.5, label=f"{flow} flow")
@@ -117,7 +117,8 @@ def beside(size: str, progress: Progress) -> list[tuple[float, str, Mean]]:
     for k, speed in enumerate(SPEEDS):
         filter = stream(speed, size)
         matrix = filter.matrix
-        for flow, name in (("resolved", "matrix"), ("uniform", "matrix, uniform flow")):
+        flows: tuple[tuple[Flow, str], ...] = (("resolved", "matrix"), ("uniform", "matrix, uniform flow"))
+        for flow, name in flows:
             some = runs(replace(filter, flow=flow), FIGURE_STARTS)
             rows.append((speed, name, Mean.of([penetration(one) for one in some])))
         n, stages = matrix.density, matrix.depth * matrix.density ** (1 / 3)

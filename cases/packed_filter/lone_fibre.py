@@ -27,9 +27,9 @@ from tisim.cases.packed_filter.scene import PackedFilter, magnetised
 from tisim.engine.batches import Progress
 from tisim.sources import Cylinder
 
-MARGIN = 5.0
+START_MARGIN = 5.0
 """Distance from the fibre within which colloids start, D. Fibres attract them from less than that."""
-CLASSES = 6
+SIZE_CLASSES = 6
 """Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
 
 
@@ -53,8 +53,8 @@ class LoneFibre:
         time : from the start of the run, s. fibres : per volume (1/m^3), or per area (1/m^2), that a colloid
         meets in each of a number of stages; 1 for exp(-n V), more for (1 - n V)^stages.
         """
-        edges = np.quantile(self.radius, np.linspace(0, 1, CLASSES + 1))
-        kind = np.clip(np.searchsorted(edges, self.radius, side="right") - 1, 0, CLASSES - 1)
+        edges = np.quantile(self.radius, np.linspace(0, 1, SIZE_CLASSES + 1))
+        kind = np.clip(np.searchsorted(edges, self.radius, side="right") - 1, 0, SIZE_CLASSES - 1)
         caught = (self.captured_at >= 0) & (self.captured_at <= time)
         size = self.size[:, None]
         # The jackknife over fibres gives the interval of a mean that is no linear function of them.
@@ -66,7 +66,7 @@ class LoneFibre:
 
     @staticmethod
     def _passed(kind: np.ndarray, volume: np.ndarray, fibres: float, stages: float) -> float:
-        captured = np.array([volume[kind == k].mean() for k in range(CLASSES)])
+        captured = np.array([volume[kind == k].mean() for k in range(SIZE_CLASSES)])
         expected = fibres * captured
         survive = np.exp(-expected) if stages == 1.0 else np.maximum(1 - expected, 0.0) ** stages
         return float(survive.mean())
@@ -85,7 +85,7 @@ def lone_fibres(
     matrix = filter.matrix
     scenes, sizes = [], []
     for k, axis in enumerate(axes):
-        half = MARGIN * matrix.diameter + 0.5 * (matrix.length * np.abs(axis) + matrix.diameter)
+        half = START_MARGIN * matrix.diameter + 0.5 * (matrix.length * np.abs(axis) + matrix.diameter)
         a, b, c = (float(x) for x in half)
         box = Box(low=(-a, -b, -c), high=(a, b, c), periodic=(False, False, False), images=False)
         body = Cylinder(axis=tuple(axis.tolist()), radius=matrix.diameter / 2, length=matrix.length)

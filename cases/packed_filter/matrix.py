@@ -26,7 +26,7 @@ from tisim.steppers import EnergyMinimisation
 
 LOOSE = 0.03
 """Packing fraction of the random start of rods."""
-ALONG = np.array([0.0, 0.0, 1.0])
+FLOW_DIRECTION: Vector = (0.0, 0.0, 1.0)
 """Direction of the flow."""
 KEPT_MATRICES = 16
 """Matrices that are kept in memory, as each start of a design asks for its own again."""
@@ -85,10 +85,10 @@ class Matrix:
         InputError if rods of this aspect ratio jam before they have the fraction.
         """
         centres, axes = _packing(self.aspect, self.fraction, self.number, self.seed)
-        centres = (centres - 0.5 * (1 - ALONG)) * self.side
+        centres = (centres - 0.5 * (1 - np.array(FLOW_DIRECTION))) * self.side
         return tuple(
             Cylinder(
-                centre=_vector(centre + layer * self.side * ALONG),
+                centre=_vector(centre + layer * self.side * np.array(FLOW_DIRECTION)),
                 axis=_vector(axis),
                 radius=self.diameter / 2,
                 length=self.length,

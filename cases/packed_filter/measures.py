@@ -10,6 +10,14 @@ from tisim.analysis import particle_balance
 from tisim.sources import PoreFlow
 
 
+def matrix_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower and the upper corner of the box of the matrix, m."""
+    low, high = scene.domain.bounds()
+    assert low is not None
+    assert high is not None
+    return low, high
+
+
 def inside(result: Result) -> np.ndarray:
     """Return which colloids have entered the filter, shape (n,)."""
     return np.asarray(result.state.get("entered_at", np.zeros(len(result.state["mass"]))) >= 0)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tisim import Result, Scene
 from tisim.analysis import PackedBodies
+from tisim.cases.packed_filter.measures import matrix_box
 from tisim.io.reader import Frames
 from tisim.plotting.bodies import draw_bodies
 from tisim.plotting.style import TIME, empty, letters, plain
@@ -55,12 +56,11 @@ def draw_filter(
 ) -> None:
     """Draw the fibres of the matrix, streamlines, and the captured colloids, coloured by the time of their
     capture."""
-    low, high = scene.domain.bounds()
-    assert low is not None
+    low, high = matrix_box(scene)
     magnets = next(one for one in scene.effects if isinstance(one, MagneticCylinders)).cylinders
     centre = np.array([one.centre for one in magnets])
-    own = ((centre >= low) & (centre <= high)).all(axis=1)
-    fibres = [one for one, kept in zip(magnets, own, strict=True) if kept]
+    own = np.all((centre >= low) & (centre <= high), axis=1)
+    fibres = [one for k, one in enumerate(magnets) if own[k]]
     unit, norm = 2 * fibres[0].radius, Normalize(0.0, end)
     held = state["captured_by"] >= 0
     lines = streamlines(scene, unit)
@@ -98,7 +98,7 @@ def draw_filter(
 def streamlines(scene: Scene, unit: float) -> np.ndarray:
     """Return points (m) of the streamlines in front of the matrix and through it, shape (points, lines, 3);
     no line without a flow. unit : D, m."""
-    low, high = scene.domain.bounds()
+    low, high = matrix_box(scene)
     if not any(isinstance(one, Source) and one.quantity == FLOW for one in scene.effects):
         return np.empty((1, 0, 3))
     side = (np.arange(STREAMLINES) + 0.5) / STREAMLINES

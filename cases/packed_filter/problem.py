@@ -20,7 +20,7 @@ import numpy as np
 from tisim import Result, Scene
 from tisim.cases.case import searched_size
 from tisim.cases.packed_filter.matrix import Matrix
-from tisim.cases.packed_filter.measures import captured_fraction, penetration, pressure_drop
+from tisim.cases.packed_filter.measures import captured_fraction, matrix_box, penetration, pressure_drop
 from tisim.cases.packed_filter.pictures import caught
 from tisim.cases.packed_filter.scene import MEAN_RADIUS, SIZES, TITLE, PackedFilter
 from tisim.errors import must
@@ -82,7 +82,7 @@ def designed(design: Mapping[str, float], seed: int, **settings: float) -> Packe
 
 def depth(result: Result) -> float:
     """Return the depth of the matrix of a run, m."""
-    low, high = result.scene.domain.bounds()
+    low, high = matrix_box(result.scene)
     return float(high[2] - low[2])
 
 

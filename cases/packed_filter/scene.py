@@ -7,7 +7,7 @@ that touches a fibre is captured.
 "static" is B16's static separation: the colloids are spread at random in the pores, and nothing flows. The
 matrix and the positions of the colloids are periodic along all axes. "dynamic" is B16's dynamic separation: a
 suspension enters in front of the matrix, flows through it, and is counted behind it. The matrix is periodic
-across the flow. The field is the sum of the fields of all fibres within ``REACH`` of the matrix.
+across the flow. The field is the sum of the fields of all fibres within ``IMAGE_REACH`` of the matrix.
 
 B16 gives the field of about 1 and 1.5 T, the fibres, of 0.4 mm and 4, 7 and 11 mm, and the magnetic radius of
 the colloids. It does not give the solid fraction, the flow, or the hydrodynamic radius, which is here the
@@ -27,7 +27,7 @@ from scipy.fft import next_fast_len
 from tisim import Box, Particles, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
-from tisim.cases.packed_filter.matrix import KEPT_MATRICES, Matrix
+from tisim.cases.packed_filter.matrix import FLOW_DIRECTION, KEPT_MATRICES, Matrix
 from tisim.components.component import Vector
 from tisim.effects import Effect, LangevinMoment, Magnetophoresis
 from tisim.geometry import Plane
@@ -51,22 +51,21 @@ MEAN_RADIUS, POLYDISPERSITY = 5.1e-9, 0.40
 """Mean magnetic radius of the colloids, m, and their standard deviation over it (B16 section 7.4.1)."""
 SMALLEST_RADIUS, LARGEST_RADIUS = 1e-9, 20e-9
 """Radii of the smallest and largest colloids, m."""
-REACH = 1.0
+IMAGE_REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
 LONGEST_MOVE = 0.05
 """Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D."""
-DIGITS = 3
+FIELD_DIGITS = 3
 """Number of digits of the field; random motion outweighs this error."""
 APPROACH = 1.0
 """Distance of the faces at which colloids enter and leave from the matrix, in lengths of a fibre."""
-ALONG: Vector = (0.0, 0.0, 1.0)
-"""Direction of the flow."""
 ADHERING = 0.4
 """Fraction of captured colloids that are never released: B16 released at most 60 % (section 7.5)."""
 MATRIX_SETTINGS = tuple(one.name for one in fields(Matrix))
 CLEAR = 1.001
 """Colloids start outside the fibres, enlarged by this factor."""
 Mode = Literal["static", "dynamic"]
+Flow = Literal["resolved", "uniform"]
 
 SEARCH: dict[str, Any] = {"options": {"population": 12}, "ensemble": {"confirm": 8}}
 """Settings of searches of every size."""
@@ -94,8 +93,9 @@ class PackedFilter:
     """A filter and the suspension in it.
 
     matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
-    magnetise each other. speed : superficial velocity of the water, the volume flow over the cross section of
-    the column, m/s. flow : "resolved" between the fibres, or "uniform" with the mean velocity in the pores.
+    magnetise each other. digits : of the sum of their fields. speed : superficial velocity of the water, the
+    volume flow over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform"
+    with the mean velocity in the pores.
     resolution : cells of the resolved flow over D. feed : time until which colloids enter, s. field_end :
     time at which the field is switched off, s. adhering : fraction of captured colloids that are never
     released; None for captures that last for ever. mean_radius, polydispersity : of the colloids, m, and
@@ -106,8 +106,9 @@ class PackedFilter:
     mode: Mode = "static"
     flux: float = 1.0
     mutual: bool = True
+    digits: int = FIELD_DIGITS
     speed: float = 1e-4
-    flow: Literal["resolved", "uniform"] = "resolved"
+    flow: Flow = "resolved"
     resolution: float = 5.0
     feed: float = 60.0
     field_end: float = NO_END
@@ -187,7 +188,9 @@ class PackedFilter:
             effects=(
                 MagneticField(constant=self.field(), end=self.field_end),
                 MagneticCylinders(
-                    cylinders=magnets, table_digits=DIGITS, sum_digits=DIGITS, end=self.field_end
+                    cylinders=magnets,
+                    sum_digits=self.digits,
+                    end=self.field_end,
                 ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
                 Magnetophoresis(),
@@ -220,7 +223,9 @@ class PackedFilter:
             )
         return (
             flow,
-            Inlet(low=(left, front, first), high=(right, back, entry), direction=ALONG, end=self.feed),
+            Inlet(
+                low=(left, front, first), high=(right, back, entry), direction=FLOW_DIRECTION, end=self.feed
+            ),
             Outlet(planes=(Plane(point=(0.0, 0.0, last), normal=(0.0, 0.0, -1.0)),)),
         )
 
@@ -263,13 +268,13 @@ def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int) -> np
 @lru_cache(KEPT_MATRICES)
 def _magnets(matrix: Matrix, flux: Vector, bulk: bool, mutual: bool) -> tuple[Cylinder, ...]:
     fibres = matrix.fibres()
-    every = matrix.with_images(fibres, REACH * matrix.length, bulk)
+    every = matrix.with_images(fibres, IMAGE_REACH * matrix.length, bulk)
     if mutual:
         own = magnetise(every, flux, STEEL_SATURATION, math.inf)[: len(fibres)]
     else:
         own = tuple(magnetised(one, flux) for one in fibres)
     # The outermost images lack neighbours; all images are magnetised as their fibres.
-    return matrix.with_images(own, REACH * matrix.length, bulk)
+    return matrix.with_images(own, IMAGE_REACH * matrix.length, bulk)
 
 
 def magnetised(body: Cylinder, flux: Vector) -> Cylinder:

@@ -200,7 +200,7 @@ def of_superballs(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     rises = f"{peak:g}, {text(by['fraction'][peak])}"
     yield Compared("densest exponent", "Fig. 4.5; first rises, then falls", rises)
     yield Compared(f"packing fraction, exponent {last:g}", "Fig. 4.5", text(by["fraction"][last]))
-    for shape, published in ((2.0, "5.84"), (last, "2.1")):
+    for shape, published in ((2.0, "5.84"), (last, "2.1 at exponent 5")):
         at_contact = f"; {text(by['contacts'][shape])} extrapolated"
         here = text(by["touching"][shape]) + at_contact
         yield Compared(f"contact number up to 1e-4 D, exponent {shape:g}", published, here)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tisim.analysis import Mean
-from tisim.analysis.packings.orientational_order import random_nematic_order
+from tisim.analysis.packings.orientational_order import random_nematic_order, random_order
 from tisim.cases.packing.comparisons import (
     CONTACTS_IN_FILE,
     CONTACTS_OF_RODS,
@@ -33,6 +33,9 @@ LONGEST_SHORT = 10.0
 """Aspect ratio from which the density of thin rods is drawn, on a logarithmic axis."""
 SPHERES = 0.64
 """Packing fraction of random close packing of spheres."""
+PUBLISHED_SPHERES, PUBLISHED_CONTACTS = 0.61, ((2.0, 5.0), (5.84, 2.1))
+"""Packing fraction of spheres, and contact numbers at two exponents, with a linear decrease between them (B16
+4.5)."""
 Curve = Mapping[float, Mean]
 """Means by the value on the abscissa."""
 
@@ -98,17 +101,32 @@ def of_rods(rows: Sequence[PackedRow]) -> Figure:
 
 
 def of_superballs(rows: Sequence[PackedRow]) -> Figure:
-    """Draw superballs by exponent (B16 Fig. 4.5)."""
-    figure = panels(rows, "shape", r"exponent $\gamma$", "method", "{}")
-    figure.axes[0].axhline(SPHERES, color="0.6", lw=0.8)
-    cubatic = by(rows, "shape", "cubatic", "method", "{}")
-    for axis in figure.axes[2:]:
-        (curve,) = cubatic.values()
-        draw(axis, {})
-        axis.errorbar(
-            list(curve), [one.value for one in curve.values()], fmt="s-", ms=3, lw=1, color=COLOURS[1]
+    """Draw superballs by exponent beside the numbers of B16 (Fig. 4.5): packing fraction; contacts up to 1e-4
+    D, which is the contact number of B16, and extrapolated; nematic and cubatic order, with their values in
+    as many random directions."""
+    figure = empty(12.6, 3.9)
+    axes = figure.subplots(1, 3)
+    shown = (
+        {"packing fraction": "fraction"},
+        {"gaps up to 1e-4 D": "touching", "extrapolated to contact": "contacts"},
+        {"nematic order S2": "nematic", "cubatic order S4": "cubatic"},
+    )
+    for axis, measures in zip(axes, shown, strict=True):
+        draw(
+            axis, {label: by(rows, "shape", name, "study")["superballs"] for label, name in measures.items()}
         )
-        axis.set_ylabel("nematic order S2 (blue), cubatic order S4 (red)")
+        axis.set_xlabel(r"exponent $\gamma$")
+    axes[0].axhline(SPHERES, color="0.6", lw=0.8)
+    axes[0].plot(2.0, PUBLISHED_SPHERES, "k+", label="B16")
+    axes[1].plot(*PUBLISHED_CONTACTS, "k+--", lw=0.8, label="B16")
+    random = random_order(rows[0].number)
+    for order, colour in ((random.nematic, COLOURS[0]), (random.cubatic, COLOURS[1])):
+        axes[2].axhline(order, color=colour, lw=0.8, ls=":")
+    for axis, title in zip(axes, ("packing fraction", "mean contact number", "order"), strict=True):
+        axis.set_ylabel(title)
+        axis.set_ylim(0.55 if title == "packing fraction" else 0, None)
+        axis.legend(frameon=False, fontsize=8)
+    letters(axes)
     return figure
 
 

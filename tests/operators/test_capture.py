@@ -153,3 +153,41 @@ def test_fixed_particles_start_at_rest_and_stay():
         simulate([moving], capacity=1)
     with pytest.raises(InputError, match=r"effects.capture must be used without impact; received 'impact'"):
         scene(place, speed, (body, Capture(), Impact(hardness=1.0)))
+
+
+@pytest.mark.long
+def test_fibres_in_cells_capture_as_all_fibres_do():
+    """With ``sum_digits`` only the fibres near the cell of a particle are compared with it. Particles fly
+    through empty space from one group of fibres to another; the results agree to the bit."""
+    rng = np.random.default_rng(4)
+    groups = np.repeat([(-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)], 20, axis=0)
+    fibres = [
+        Cylinder(centre=centre, axis=axis, radius=0.02, length=0.6, magnetisation=(0.0, 0.0, 1e5))
+        for centre, axis in zip(
+            groups + rng.normal(size=(40, 3)) * 0.4, rng.normal(size=(40, 3)), strict=True
+        )
+    ]
+    start = rng.uniform((-5.0, -0.7, -0.7), (-3.5, 0.7, 0.7), (64, 3))
+    results = []
+    for digits in (None, 3):
+        setup = scene(
+            start,
+            np.tile([6.0, 0.0, 0.0], (64, 1)),
+            (
+                MagneticCylinders(cylinders=fibres, sum_digits=digits),
+                Tether(stiffness=(0.0, 0.0, 0.0)),
+                Capture(),
+            ),
+            radius=0.01,
+            mass=1.0,
+            dt=0.003,
+            steps=500,
+        )
+        results += simulate([setup])
+    every, near = results
+    caught = every.state["captured_by"]
+    assert (caught[caught >= 0] < 20).any()
+    assert (caught >= 20).any()
+    assert (caught < 0).any()
+    for name, values in every.state.items():
+        np.testing.assert_array_equal(values, near.state[name], err_msg=name)

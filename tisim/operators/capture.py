@@ -20,12 +20,12 @@ from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 from tisim.state.fields import Field, WorldField
 
-CLEARANCE = (
+CLEARANCE_FIELDS = (
     Field("clearance", "m", 1, "keep", scratch=True),
     Field("cleared_from", "m", 3, "keep", scratch=True),
 )
-"""The distance to the nearest magnet when a particle was last compared with all of them, and its place then.
-It can touch none before it has moved by the difference of this distance and its radius."""
+"""A distance within which there was no magnet when one was last looked for, and the place of the particle
+then. It can touch none before it has moved by the difference of this distance and its radius."""
 SURE = 0.999
 """Part of this path in which no magnet is looked for, whatever the rounding."""
 
@@ -78,7 +78,7 @@ class Capture(TouchingMagnets):
         return {} if self.release is None else {"release": self.release}
 
     def required_fields(self) -> tuple[str | Field, ...]:
-        return (*self.fields, *CLEARANCE, *(self.release_fields if self.release else ()))
+        return (*self.fields, *CLEARANCE_FIELDS, *(self.release_fields if self.release else ()))
 
     def required_world_fields(self) -> tuple[WorldField, ...]:
         releases = (WorldField("releases", "counter"),) if self.release else ()

@@ -22,18 +22,25 @@ class TouchingMagnets(Operator):
     @ti.func
     def touched(self, w, r, radius):
         """Return the number of the nearest magnet if a sphere at r (m) touches it, or -1; the distance of r
-        from its surface (m), negative inside; and the unit vector along which this distance increases."""
+        from its surface (m), negative inside; and the unit vector along which this distance increases.
+
+        If it touches none, the distance may be less than that from the nearest magnet, but never more.
+        """
         before, by, least, outward = 0, -1, 0.0 * radius + ti.math.inf, 0.0 * r
+        complete = least
         for magnets in ti.static(self.magnets):
-            first, end, listed = magnets.nearby(w, r, radius)
+            first, end, listed, reach = magnets.nearby(w, r, radius)
+            complete = ti.min(complete, reach)
             for e in range(first, end):
-                k = magnets.body(w, e, listed)
+                k = e
+                if listed:
+                    k = magnets.near_body(w, e)
                 distance, normal = magnets.each.nearest(w, k, r)
                 if distance <= least:
                     least, by, outward = distance, before + k, normal
             before += magnets.each.size(w)
         if least > radius:
-            by = -1
+            by, least = -1, ti.min(least, complete)
         return by, least, outward
 
     @ti.func

@@ -19,15 +19,15 @@ from tisim.errors import must
 from tisim.numerics import solid_harmonics
 from tisim.sources.magnetic import cylinder_rows
 from tisim.sources.magnetic.cylinder_body import Cylinder
-from tisim.sources.magnetic.local_expansions import GRADIENT, Octree, design, expand, fields, gaps
+from tisim.sources.magnetic.local_expansions import GRADIENT_ELEMENTS, Octree, design, expand, fields, gaps
 
-LEAVES, NEAR = 64, 12
+LEAVES_PER_CYLINDER, NEAR_PER_LEAF = 64, 12
 """Number of leaves for each cylinder that a list can hold, and of near cylinders for each leaf."""
 DEGREES = {2: 6, 3: 8, 4: 9, 5: 10}
 """Degree of the polynomials by the number of digits; the fastest (tests/benchmarks/many_fibres.py)."""
-TOLERANCE, TRIES = 0.05, 4
+FIRST_TOLERANCE, TRIES = 0.05, 4
 """First tolerance for one cylinder, over the wanted error of the sum, and number of tolerances tried."""
-SAFE = 1.5
+ERROR_MARGIN = 1.5
 """Upper bound on the largest error in the region over the largest at the tested points."""
 BOXES, BOX_POINTS = 400, 16
 """Number of small boxes in which errors are measured, and of points in each."""
@@ -35,8 +35,8 @@ BOXES, BOX_POINTS = 400, 16
 
 def _numbers(cylinders: int) -> tuple[int, int, int]:
     """Return the numbers of nodes, of leaves and of near cylinders in all for a list of this capacity."""
-    leaves = LEAVES * cylinders
-    return (8 * leaves) // 7 + 1, leaves, NEAR * leaves
+    leaves = LEAVES_PER_CYLINDER * cylinders
+    return (8 * leaves) // 7 + 1, leaves, NEAR_PER_LEAF * leaves
 
 
 def _region(cylinders: Sequence[Cylinder]) -> tuple[np.ndarray, np.ndarray]:
@@ -66,8 +66,8 @@ def _typical(numbers: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[fl
 
 
 def _norm(slope: np.ndarray) -> np.ndarray:
-    """Return the norm of gradients given by the five elements of ``GRADIENT``, shape (n, 5, ...)."""
-    squares = sum((1.0 if a == c else 2.0) * slope[:, k] ** 2 for k, (a, c) in enumerate(GRADIENT))
+    """Return the norm of gradients given by the five elements of ``GRADIENT_ELEMENTS``, shape (n, 5, ...)."""
+    squares = sum((1.0 if a == c else 2.0) * slope[:, k] ** 2 for k, (a, c) in enumerate(GRADIENT_ELEMENTS))
     norm: np.ndarray = np.sqrt(squares + (slope[:, 0] + slope[:, 3]) ** 2)
     return norm
 
@@ -106,11 +106,11 @@ def _cell_row(cylinders: tuple[Cylinder, ...], digits: int, settings: runtime.Ru
     numbers, (low, high) = cylinder_rows.rows(cylinders), _region(cylinders)
     typical = np.array(_typical(numbers, low, high))
     root = np.array([*(0.5 * (low + high)), (high - low).max()])
-    part = TOLERANCE
+    part = FIRST_TOLERANCE
     for _ in range(TRIES):
         b, slope = part * 10.0**-digits * typical
         tree = expand(cylinders, root, DEGREES[digits], (b, slope), sizes[1])
-        error = SAFE * float((np.array(_errors(numbers, tree, DEGREES[digits])) / typical).max())
+        error = ERROR_MARGIN * float((np.array(_errors(numbers, tree, DEGREES[digits])) / typical).max())
         if error <= 10.0**-digits:
             return _packed(tree, DEGREES[digits], sizes)
         part *= min(0.5, 0.8 * 10.0**-digits / error)
@@ -186,9 +186,9 @@ class CellSum:
         return ti.cast(self.number(w, at), ti.i32), ti.cast(self.number(w, at + 1), ti.i32)
 
     @ti.func
-    def index(self, w, e, listed):
-        """Return the index of the cylinder at place e in the list, or e itself unless ``listed``."""
-        return ti.select(listed > 0, ti.cast(self.number(w, self.listed + listed * e), ti.i32), e)
+    def index(self, w, e):
+        """Return the index of the cylinder at a place in the list."""
+        return ti.cast(self.number(w, self.listed + e), ti.i32)
 
     @ti.func
     def distant(self, w, leaf, x, half, slopes: ti.template()):  # type: ignore[valid-type]
@@ -213,7 +213,7 @@ class CellSum:
             for n in range(self.degree - 1):
                 for m in range(n + 1):
                     k = n * (n + 1) + 2 * m
-                    for a, c in ti.static(GRADIENT):
+                    for a, c in ti.static(GRADIENT_ELEMENTS):
                         one = solid_harmonics.shifted(parts[a], n, m, c)
                         slope[a, c] += one[0] * basis[k] + one[1] * basis[k + 1]
             slope[2, 2] = -slope[0, 0] - slope[1, 1]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import model_validator
 
+from tisim.backend import runtime
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option
 from tisim.errors import must
@@ -20,12 +21,17 @@ from tisim.sources.magnetic.local_expansions import LEAST_GAP
 from tisim.sources.magnetic.magnets import Magnets
 from tisim.state.bound import Peers
 
-NEAR_TOGETHER, FEWEST_TOGETHER = 8, 3
-"""Number of near cylinders that are evaluated together, and the smallest number for which this is faster."""
 NEAR_REACH = LEAST_GAP - 3**0.5
 """Distance from any point of a leaf within which all cylinders are near, in half sides."""
-MANY = 10
+NEAR_TOGETHER, FEWEST_TOGETHER = 8, 3
+"""Number of near cylinders that a CPU evaluates together, and the smallest number for which it does."""
+FEWEST_IN_CELLS = 10
 """Number of cylinders from which a sum by cells is tried as an approximation."""
+
+
+def near_together() -> int:
+    """Return the number of near cylinders that are evaluated together."""
+    return NEAR_TOGETHER if runtime.current().device == "cpu" else 1
 
 
 class MagneticCylinders(Magnets):
@@ -59,6 +65,11 @@ class MagneticCylinders(Magnets):
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
 
+    in_cells: ClassVar[Any]
+    """The octree of a world, in the bound source."""
+    has_cells: ClassVar[bool]
+    """Whether the sum is by cells, in the bound source."""
+
     cylinders: tuple[Cylinder, ...] = option("the cylinders; worlds of a batch may have different numbers")
     table_digits: int | None = option(
         "digits of accuracy of field and gradient from a table; closed forms unless given",
@@ -85,8 +96,8 @@ class MagneticCylinders(Magnets):
             return ()
         short = any(one.length < one.radius for one in self.cylinders)
         by_table = () if short else (3, 4, 5)
-        by_cells = (3, 4, 5) if len(self.cylinders) >= MANY else ()
-        ways = [(table, None) for table in by_table]
+        by_cells = (3, 4, 5) if len(self.cylinders) >= FEWEST_IN_CELLS else ()
+        ways: list[tuple[int | None, int | None]] = [(digits, None) for digits in by_table]
         for digits in by_cells:
             ways += [(table, digits) for table in (digits, None) if table is None or by_table]
         ways.sort(key=lambda way: way[1] or way[0] or 0)
@@ -108,106 +119,113 @@ class MagneticCylinders(Magnets):
         bound, digits, cells = peers.bound(self), self.table_digits, self.sum_digits
         bound.cylinders.ends = ClosedEnds() if digits is None else TabulatedEnds(bound.table, digits)
         capacity = Cylinder.list_capacity(len(self.cylinders))
-        octree = None if cells is None else CellSum(bound.cells, capacity, cells)
-        return {**super().connect(peers), "octree": octree, "has_cells": cells is not None}
+        in_cells = None if cells is None else CellSum(bound.cells, capacity, cells)
+        return {**super().connect(peers), "in_cells": in_cells, "has_cells": cells is not None}
 
     @ti.func
     def value(self, w, r, t):
         b = 0.0 * r
         if ti.static(self.has_cells):
-            b = self.by_cells(w, r, t, False)[0]
+            b += self.by_cells(w, r, t, False)[0]
         else:
-            for k in range(self.magnetised(w, t)):
-                b += self.each.flux_density(w, k, r)
+            b += self.direct_value(w, r, t)
         return b
 
     @ti.func
     def value_and_gradient(self, w, r, t):
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        if ti.static(self.has_cells):
-            b, gradient = self.by_cells(w, r, t, True)
+        if ti.static(not self.has_cells):
+            b, gradient = self.direct(w, r, t)
         else:
-            for k in range(self.magnetised(w, t)):
-                one, slope = self.each.flux(w, k, r)
-                b += one
-                gradient += slope
+            b, gradient = self.by_cells(w, r, t, True)
         return b, gradient
 
     @ti.func
     def by_cells(self, w, r, t, slopes: ti.template()):  # type: ignore[valid-type]
-        """Return the field at r from the cell around it, and its gradient, 0 unless ``slopes``."""
+        """Return the field at r from the cell around it, and the gradient, 0 unless ``slopes``."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
-        leaf, x, half = self.octree.leaf(w, r)
-        first, end, listed = self.near_cylinders(w, leaf)
-        if self.magnetised(w, t) == 0:
-            end = first
-        elif listed == 1:
-            b, gradient = self.octree.distant(w, leaf, x, half, slopes)
-        lanes = ti.static(NEAR_TOGETHER)
-        for group in range((end - first + lanes - 1) // lanes):
-            start = first + group * lanes
-            count = ti.min(lanes, end - start)
-            chosen, left = ti.Vector([0] * lanes, ti.i32), ti.Vector([1] * lanes, ti.i32)
-            found = [ti.Vector([0.0 * half] * lanes) for _ in ti.static(range(12 if slopes else 3))]
-            for lane in range(lanes):
-                chosen[lane] = self.octree.index(w, ti.min(start + lane, end - 1), listed)
-            if count >= FEWEST_TOGETHER:
-                for lane in range(lanes):
-                    one, slope, right = self.each.flux_mostly(w, chosen[lane], r)
-                    left[lane] = ti.select(right, 0, 1)
-                    for a in ti.static(range(3)):
-                        found[a][lane] = one[a]
-                        for c in ti.static(range(len(found) // 3 - 1)):
-                            found[3 + 3 * a + c][lane] = slope[a, c]
-            for lane in range(count):
-                one = ti.Vector([found[a][lane] for a in ti.static(range(3))])
-                slope = 0.0 * gradient
-                if ti.static(slopes):
-                    for a, c in ti.static(ti.ndrange(3, 3)):
-                        slope[a, c] = found[3 + 3 * a + c][lane]
-                if left[lane] > 0:
-                    if ti.static(slopes):
-                        one, slope = self.each.flux(w, chosen[lane], r)
-                    else:
-                        one = self.each.flux_density(w, chosen[lane], r)
+        if self.magnetised(w, t) > 0:
+            leaf, x, half = self.in_cells.leaf(w, r)
+            first, end, listed = self.listed(w, leaf)
+            if listed:
+                b, gradient = self.in_cells.distant(w, leaf, x, half, slopes)
+            lanes = ti.static(near_together())
+            for group in range((end - first + lanes - 1) // lanes):
+                start = first + group * lanes
+                one, slope = self.together(w, r, start, ti.min(end - start, lanes), listed, slopes)
                 b += one
                 gradient += slope
         return b, gradient
 
     @ti.func
-    def near_cylinders(self, w, leaf):
-        """Return the range of places in the list of near cylinders of a leaf, and 1; without a list the
-        indices of all cylinders, and 0."""
-        first, end, listed = 0, self.each.size(w), 0
+    def together(self, w, r, start, count, listed, slopes: ti.template()):  # type: ignore[valid-type]
+        """Return the field and the gradient, 0 unless ``slopes``, of ``count`` cylinders, at most
+        ``near_together``, from a place in the list of near cylinders on, or from an index on."""
+        lanes = ti.static(near_together())
+        b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
+        chosen, left = ti.Vector([0] * lanes, ti.i32), ti.Vector([1] * lanes, ti.i32)
+        found = [ti.Vector([0.0 * r[0]] * lanes) for _ in ti.static(range(12 if slopes else 3))]
+        for lane in range(lanes):
+            chosen[lane] = start + ti.min(lane, count - 1)
+            if listed:
+                chosen[lane] = self.in_cells.index(w, chosen[lane])
+        if ti.static(not self.table_digits) and count >= FEWEST_TOGETHER:
+            # Without branches, so that compilers vectorise; then those for which this is invalid.
+            for lane in range(lanes):
+                one, slope, right = self.each.flux_mostly(w, chosen[lane], r)
+                left[lane] = ti.select(right, 0, 1)
+                for a in ti.static(range(3)):
+                    found[a][lane] = one[a]
+                    for c in ti.static(range(len(found) // 3 - 1)):
+                        found[3 + 3 * a + c][lane] = slope[a, c]
+        for lane in range(count):
+            one = ti.Vector([found[a][lane] for a in ti.static(range(3))])
+            slope = 0.0 * gradient
+            if ti.static(slopes):
+                for a, c in ti.static(ti.ndrange(3, 3)):
+                    slope[a, c] = found[3 + 3 * a + c][lane]
+            if left[lane] > 0:
+                if ti.static(slopes):
+                    one, slope = self.each.flux(w, chosen[lane], r)
+                else:
+                    one = self.each.flux_density(w, chosen[lane], r)
+            b += one
+            gradient += slope
+        return b, gradient
+
+    @ti.func
+    def listed(self, w, leaf):
+        """Return the range of places in the list of near cylinders of a leaf, and True; without a list the
+        indices of all cylinders, and False."""
+        first, end, listed = 0, self.each.size(w), False
         if leaf >= 0:
-            begin, last = self.octree.near(w, leaf)
+            begin, last = self.in_cells.near(w, leaf)
             if last >= begin:
-                first, end, listed = begin, last, 1
+                first, end, listed = begin, last, True
         return first, end, listed
 
     @ti.func
     def nearby(self, w, r, radius):
-        first, end, listed = 0, self.each.size(w), 0
+        first, end, listed, reach = 0, self.each.size(w), False, 0.0 * radius + ti.math.inf
         if ti.static(self.has_cells):
-            leaf, _x, half = self.octree.leaf(w, r)
+            leaf, _x, half = self.in_cells.leaf(w, r)
             if radius < NEAR_REACH * half:
-                first, end, listed = self.near_cylinders(w, leaf)
-        return first, end, listed
+                first, end, listed = self.listed(w, leaf)
+                reach = ti.select(listed, NEAR_REACH * half, reach)
+        return first, end, listed, reach
 
     @ti.func
-    def body(self, w, e, listed):
+    def near_body(self, w, e):
         k = e
         if ti.static(self.has_cells):
-            k = self.octree.index(w, e, listed)
+            k = self.in_cells.index(w, e)
         return k
 
     @ti.func
     def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        # The points of a tile are in different cells.
-        if ti.static(self.has_cells):
-            for lane in range(ti.static(r[0].n)):
-                place = ti.Vector([r[0][lane], r[1][lane], r[2][lane]])
-                one, slope = self.by_cells(w, place, t, True)
-                add_point(value, gradient, lane, one, slope)
+        if ti.static(not self.has_cells):
+            self.add_direct(w, r, t, value, gradient)
         else:
-            self.add_each(w, r, t, value, gradient)
+            for lane in range(ti.static(r[0].n)):
+                one, slope = self.value_and_gradient(w, ti.Vector([r[0][lane], r[1][lane], r[2][lane]]), t)
+                add_point(value, gradient, lane, one, slope)

@@ -18,7 +18,7 @@ from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_frame import relative_place
 from tisim.sources.magnetic.stoner_wohlfarth import demagnetising_factor
 
-ALONG = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
+AXIAL_POINTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 """Numbers of points along the axis of a cylinder over which a field is averaged."""
 RINGS = (1, 2, 3, 4)
 """Numbers of rings of points across a cylinder; n rings have 4 n points each."""
@@ -110,7 +110,7 @@ def demagnetising_tensors(cylinders: Sequence[Cylinder], pieces: int = 1) -> np.
     for k in range(n):
         gap[k] = segment_distances(centre - centre[k], axis[k], axis, float(half[k]), half)
     apart = np.maximum(gap[i, j], 0.7 * (radius[i] + radius[j]))
-    along = np.searchsorted(ALONG, np.minimum(2 + 4.0 * half[i] / apart, ALONG[-1]))
+    along = np.searchsorted(AXIAL_POINTS, np.minimum(2 + 4.0 * half[i] / apart, AXIAL_POINTS[-1]))
     rings = np.digitize(radius[i] / apart, (0.05, 0.12, 0.3))
     volume = radius**2 * half
     found = _averages(cylinders, np.stack([i, j], axis=1), along, rings)
@@ -129,7 +129,7 @@ def _averages(
     for one in np.unique(kind):
         chosen = np.flatnonzero(kind == one)
         part = np.zeros((len(chosen), 9), real)
-        nodes = _nodes(ALONG[one // len(RINGS)], RINGS[one % len(RINGS)]).astype(real)
+        nodes = _nodes(AXIAL_POINTS[one // len(RINGS)], RINGS[one % len(RINGS)]).astype(real)
         _means(ends, rows, np.ascontiguousarray(pairs[chosen], np.int32), nodes, part)
         out[chosen] = part
     return out.reshape(-1, 3, 3).astype(float)

@@ -26,10 +26,10 @@ from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_frame import relative_place
 
-FACE_POINTS, LANES = 2, 8
+FACE_POINTS, NODES_TOGETHER = 2, 8
 """Points along each side of the face of a cell at which fields are represented, and points evaluated
 together."""
-GRADIENT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
+GRADIENT_ELEMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
 """The independent elements of the gradient, a symmetric and traceless matrix."""
 OCTANTS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 """Centres of the parts of a cell, in the order x, y, z."""
@@ -37,7 +37,7 @@ LEAST_GAP = 2.0
 """Smallest distance of a distant cylinder from the centre of a cell, in half sides. No point of the cell is
 farther than sqrt(3) from the centre, so all cylinders within 2 - sqrt(3) half sides of any of its points are
 near, also those without a field."""
-PAIRS_AT_ONCE = 20_000
+CELL_PAIRS_AT_ONCE = 20_000
 """Number of pairs of a cell and a cylinder that are processed together."""
 SLACK = 0.8
 """Cylinders are tried if they are farther than this part of the smallest distance of a distant one so far."""
@@ -60,16 +60,16 @@ def _fields(
         size = cells[c, 3]
         centre, lead, rest, radius, half = cylinder_rows.placed(rows, k)
         across, along = cylinder_rows.vector(rows, k, "across"), cylinder_rows.number(rows, k, "along")
-        for first in range(nodes.shape[1] // LANES):
+        for first in range(nodes.shape[1] // NODES_TOGETHER):
             # First without branches, so that compilers vectorise; then the nodes for which this is invalid.
             # All numbers are read before and written afterwards for the same reason.
-            x = [ti.Vector([0.0 * size] * LANES) for _ in ti.static(range(3))]
-            found = [ti.Vector([0.0 * size] * LANES) for _ in ti.static(range(8))]
-            left, wrong = ti.Vector([0] * LANES, ti.i32), 0
-            for lane in range(LANES):
+            x = [ti.Vector([0.0 * size] * NODES_TOGETHER) for _ in ti.static(range(3))]
+            found = [ti.Vector([0.0 * size] * NODES_TOGETHER) for _ in ti.static(range(8))]
+            left, wrong = ti.Vector([0] * NODES_TOGETHER, ti.i32), 0
+            for lane in range(NODES_TOGETHER):
                 for a in ti.static(range(3)):
-                    x[a][lane] = place[a] + size * nodes[a, first * LANES + lane]
-            for lane in range(LANES):
+                    x[a][lane] = place[a] + size * nodes[a, first * NODES_TOGETHER + lane]
+            for lane in range(NODES_TOGETHER):
                 r = ti.Vector([x[0][lane], x[1][lane], x[2][lane]])
                 rho, outward, z, end = relative_place(r, centre, lead, rest, half)
                 six, right = cylinder_field.mostly(rho, z, end, radius, half, ends)
@@ -77,16 +77,16 @@ def _fields(
                 left[lane] = ti.select(right, 0, 1)
                 wrong += left[lane]
             if wrong > 0:
-                for lane in range(LANES):
+                for lane in range(NODES_TOGETHER):
                     if left[lane] > 0:
                         r = ti.Vector([x[0][lane], x[1][lane], x[2][lane]])
                         rho, outward, z, end = relative_place(r, centre, lead, rest, half)
                         six = cylinder_field.shape(rho, z, end, radius, half, ends)
                         _put(found, lane, six, rho, outward, lead + rest, across, along)
-            for lane in range(LANES):
+            for lane in range(NODES_TOGETHER):
                 for a in ti.static(range(8)):
                     scale = mu_0 if a < 3 else mu_0 * size
-                    out[e, a, first * LANES + lane] = scale * found[a][lane]
+                    out[e, a, first * NODES_TOGETHER + lane] = scale * found[a][lane]
 
 
 @ti.func
@@ -97,7 +97,7 @@ def _put(found: ti.template(), lane, six, rho, outward, axis, across, along):  #
     for a in ti.static(range(3)):
         found[a][lane] = side[a] + up * axis[a]
     for a in ti.static(range(5)):
-        found[3 + a][lane] = slope[ti.static(GRADIENT[a][0]), ti.static(GRADIENT[a][1])]
+        found[3 + a][lane] = slope[ti.static(GRADIENT_ELEMENTS[a][0]), ti.static(GRADIENT_ELEMENTS[a][1])]
 
 
 def design(points: np.ndarray, degree: int) -> np.ndarray:
@@ -107,7 +107,7 @@ def design(points: np.ndarray, degree: int) -> np.ndarray:
     b = solid_harmonics.values(points, degree - 1)
     slope = solid_harmonics.values(points, degree - 2)
     columns = [b @ one for one in first]
-    columns += [slope @ (solid_harmonics.derivative(c, degree - 1) @ first[a]) for a, c in GRADIENT]
+    columns += [slope @ (solid_harmonics.derivative(c, degree - 1) @ first[a]) for a, c in GRADIENT_ELEMENTS]
     return np.concatenate(columns)
 
 
@@ -211,8 +211,8 @@ def _accept(
     away = (gap + numbers[pairs[:, 1], cylinder_rows.SLOTS["radius"]]) / size
     distant = np.zeros(len(pairs), bool)
     tried = np.flatnonzero((gap > LEAST_GAP * size) & (away > SLACK * reach))
-    for begin in range(0, len(tried), PAIRS_AT_ONCE):
-        chosen = tried[begin : begin + PAIRS_AT_ONCE]
+    for begin in range(0, len(tried), CELL_PAIRS_AT_ONCE):
+        chosen = tried[begin : begin + CELL_PAIRS_AT_ONCE]
         data = fields(numbers, cells, pairs[chosen], _face_nodes()).reshape(len(chosen), -1)
         fitted = data @ back.T
         wrong = (data - fitted @ forward.T).reshape(len(chosen), 8, -1)
@@ -229,7 +229,7 @@ def _accept(
 def fields(numbers: np.ndarray, cells: np.ndarray, pairs: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return B (T) outside and h grad B (T) of the cylinder of each pair at the nodes of its cell, shape
     (pairs, 8, nodes)."""
-    real, spare = numbers.dtype, -len(nodes) % LANES
+    real, spare = numbers.dtype, -len(nodes) % NODES_TOGETHER
     filled = np.concatenate([nodes, np.zeros((spare, 3))]).T.astype(real, order="C")
     out = np.zeros((len(pairs), 8, filled.shape[1]), real)
     _fields(ClosedEnds(), numbers, cells.astype(real), pairs.astype(np.int32), filled, out)

@@ -116,7 +116,7 @@ class MagneticEnergy:
             row = self.matrix[3 * i : 3 * i + 3]
             own = row[:, 3 * i : 3 * i + 3] @ self.magnetisation[i]
             others = row @ (self.root * self.magnetisation).ravel() / self.root[i] - own
-            self.magnetisation[i] = self._alone(self.cylinders[i], self.limit[i], self.field - others)
+            self.magnetisation[i] = self._alone(self.cylinders[int(i)], self.limit[i], self.field - others)
 
     @staticmethod
     def _alone(one: Cylinder, limit: float, field: np.ndarray) -> np.ndarray:

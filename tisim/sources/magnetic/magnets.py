@@ -78,10 +78,7 @@ class Magnets(Switched):
 
     @ti.func
     def value(self, w, r, t):
-        b = 0.0 * r
-        for k in range(self.magnetised(w, t)):
-            b += self.each.flux_density(w, k, r)
-        return b
+        return self.direct_value(w, r, t)
 
     @ti.func
     def gradient(self, w, r, t):
@@ -89,6 +86,23 @@ class Magnets(Switched):
 
     @ti.func
     def value_and_gradient(self, w, r, t):
+        return self.direct(w, r, t)
+
+    @ti.func
+    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        self.add_direct(w, r, t, value, gradient)
+
+    @ti.func
+    def direct_value(self, w, r, t):
+        """Return the field at r (m), the sum over the bodies one by one."""
+        b = 0.0 * r
+        for k in range(self.magnetised(w, t)):
+            b += self.each.flux_density(w, k, r)
+        return b
+
+    @ti.func
+    def direct(self, w, r, t):
+        """Return the field at r (m) and its gradient, the sums over the bodies one by one."""
         b, gradient = 0.0 * r, 0.0 * r.outer_product(r)
         for k in range(self.magnetised(w, t)):
             one, slope = self.each.flux(w, k, r)
@@ -97,12 +111,8 @@ class Magnets(Switched):
         return b, gradient
 
     @ti.func
-    def add_tile(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        self.add_each(w, r, t, value, gradient)
-
-    @ti.func
-    def add_each(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
-        """Add field and gradient of the bodies one by one at a tile of points, as ``add_tile`` does."""
+    def add_direct(self, w, r: ti.template(), t, value: ti.template(), gradient: ti.template()):  # type: ignore
+        """Add the sums over the bodies one by one, at a tile of points (see ``add_tile``)."""
         # First the points for which the vectorised form is valid, then the others one by one; a tile of one
         # point has no vectors.
         size = ti.static(r[0].n)
@@ -125,14 +135,14 @@ class Magnets(Switched):
 
     @ti.func
     def nearby(self, w, r, radius):
-        """Return a range in which are all bodies that a sphere of a radius (m) at r may touch: of places in a
-        list of near bodies and 1, or of their indices and 0."""
-        return 0, self.each.size(w), 0
+        """Return a range of places in the list of bodies near r (m), in which are all bodies that a sphere of
+        a radius (m) at r may touch; whether the list is ``near_body``, otherwise places are indices; and a
+        distance (m), at least the radius, within which no other body is, infinite if the range has all."""
+        return 0, self.each.size(w), False, 0.0 * radius + ti.math.inf
 
     @ti.func
-    def body(self, w, e, listed):
-        """Return the index of the body at place e of the list of near bodies, or e itself unless
-        ``listed``."""
+    def near_body(self, w, e):
+        """Return the index of the body at a place of the list of bodies near r."""
         return e
 
     def connect(self, peers: Peers) -> dict[str, Any]:

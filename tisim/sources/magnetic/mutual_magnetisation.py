@@ -51,7 +51,7 @@ def magnetise(
     for all or one for each cylinder. susceptibility : None for magnets that are always saturated, as in the
     model of Stoner and Wohlfarth; otherwise M = chi H up to saturation, with ``math.inf`` for soft steel.
     ``saturation=math.inf`` makes the law linear. segments : number of equal pieces into which each cylinder
-    is cut, so that M varies along it; the result then has ``segments`` times as many cylinders. permanent :
+    is cut, so that M varies along it; the result then has ``segments`` cylinders for each. permanent :
     indices of cylinders that keep their own magnetisation. tolerance : largest ``imbalance`` of the result.
     iterations : largest number of iterations.
 
@@ -82,7 +82,7 @@ def magnetise(
         must(is_whole(k, 0) and k < len(cylinders), "permanent", "indices of cylinders", k)
         kept[k] = True
     linear = susceptibility is not None
-    must(not linear or susceptibility > 0, "susceptibility", "greater than 0", susceptibility)
+    must(susceptibility is None or susceptibility > 0, "susceptibility", "greater than 0", susceptibility)
     limit = np.broadcast_to(np.asarray(saturation, float), len(cylinders))
     allowed = (limit > 0) & (linear | np.isfinite(limit))
     must(bool(allowed.all()), "saturation", "greater than 0" + ("" if linear else " and finite"), saturation)

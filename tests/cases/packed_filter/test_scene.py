@@ -1,0 +1,107 @@
+"""Scenes of the packed filter: colloids in the pores, the field, the flow, and a whole run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tisim import run
+from tisim.cases.packed_filter.measures import captured_fraction, missing, penetration, released_fraction
+from tisim.cases.packed_filter.scene import (
+    MEAN_RADIUS,
+    POLYDISPERSITY,
+    filter_of,
+    in_pores,
+    magnetised,
+    scene_for,
+)
+from tisim.sources import MagneticCylinders, PoreFlow, sample
+
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture(scope="module")
+def filter():
+    """A filter with coarse fields, so that scenes compile quickly."""
+    return filter_of("small", number=60, feed=10.0, field_end=80.0, duration=160.0, resolution=3.0, digits=2)
+
+
+@pytest.fixture(scope="module")
+def result(filter):
+    return run(filter.scene(3))
+
+
+def test_colloids_start_in_the_pores(filter):
+    fibres, box = filter.magnets(), filter.box()
+    place = in_pores(500, fibres, box, 7)
+    assert (place >= box.low).all()
+    assert (place <= box.high).all()
+    for body in fibres:
+        away = place - body.centre
+        along = away @ body.direction
+        across = np.linalg.norm(away - np.outer(along, body.direction), axis=1)
+        assert not ((across < body.radius) & (np.abs(along) < body.length / 2)).any()
+    # They fill the pores evenly: as many in each half.
+    share = (place < (np.add(box.low, box.high) / 2)).mean(axis=0)
+    np.testing.assert_allclose(share, 0.5, atol=0.1)
+
+
+def test_sizes_and_moments_are_those_of_the_ferrofluid():
+    scene = filter_of("small", "static", number=20_000).scene(0)
+    radius, moment = (
+        scene.particles.arrays(scene.domain, 0)[name] for name in ("radius", "saturation_moment")
+    )
+    assert radius.mean() == pytest.approx(MEAN_RADIUS, rel=0.01)
+    assert radius.std() / radius.mean() == pytest.approx(POLYDISPERSITY, rel=0.03)
+    np.testing.assert_allclose(moment, 4.46e5 * 4 / 3 * np.pi * radius**3, rtol=1e-12)
+
+
+def test_neighbours_change_the_magnetisation_and_images_have_that_of_their_fibres(filter):
+    number = filter.matrix.number
+    every = np.array([one.magnetisation for one in filter.magnets()])
+    alone = np.array([one.magnetisation for one in replace(filter, mutual=False).magnets()])
+    expected = [magnetised(one, filter.field()).magnetisation for one in filter.matrix.fibres()]
+    np.testing.assert_allclose(alone[:number], expected)
+    change = np.linalg.norm(every - alone, axis=1)[:number] / 2.2e6
+    assert 0.02 < change.mean() < 0.3
+    known = {tuple(one) for one in every[:number]}
+    assert {tuple(one) for one in every[number:]} <= known
+
+
+def test_the_flow_has_the_superficial_velocity_and_rests_in_fibres(filter):
+    scene = filter.scene(0)
+    flow = next(one for one in scene.effects if isinstance(one, PoreFlow))
+    # A plane in the clear water, with points at the centres of squares.
+    x, y = (flow.low[a] + (np.arange(40) + 0.5) / 40 * (flow.high[a] - flow.low[a]) for a in range(2))
+    plane = np.stack([*(one.ravel() for one in np.meshgrid(x, y)), np.full(1600, flow.low[2] + 1e-4)], axis=1)
+    velocity, _ = sample(scene.effects, "flow_velocity", plane)
+    assert velocity[:, 2].mean() == pytest.approx(filter.speed, rel=1e-3)
+    body = filter.matrix.fibres()[0]
+    inner, _ = sample(scene.effects, "flow_velocity", [body.centre])
+    assert np.linalg.norm(inner) < 1e-3 * filter.speed
+
+
+def test_no_colloid_is_lost_and_most_are_released(result):
+    assert result.status.ok
+    assert missing([result]) == 0
+    assert result.work["entered"] == 60
+    assert result.work["captures"] > 5
+    assert 0.1 < penetration(result) < 0.95
+    assert 0.3 < released_fraction(result) < 0.9
+    # A colloid that is released leaves: after the end of the field nothing is captured again.
+    held = result.work["captures"] - result.work["releases"]
+    assert captured_fraction(result) == pytest.approx(held / 60)
+    assert result.state["captured_at"].max() <= 80.5
+
+
+def test_the_small_scene_is_dynamic_and_the_static_one_is_periodic():
+    dynamic, static = scene_for("small", 0), filter_of("small", "static").scene(0)
+    assert {one.kind() for one in dynamic.effects} - {one.kind() for one in static.effects} == {
+        "pore_flow", "inlet", "outlet",
+    }  # fmt: skip
+    assert (dynamic.domain.periodic, static.domain.periodic) == ((True, True, False), (True, True, True))
+    count = [
+        len(next(e for e in s.effects if isinstance(e, MagneticCylinders)).cylinders)
+        for s in (dynamic, static)
+    ]
+    assert count[0] < count[1]
