@@ -175,6 +175,13 @@ def test_viscosity_dissipates_the_work_of_the_pressure_gradient():
         assert found.dissipation() == pytest.approx(found.work(), rel=3e-8)
 
 
+def test_the_error_of_permeability_is_quadratic_in_the_tolerance():
+    fine = flow(FIBRES, (20, 20, 20), tolerance=TIGHT).permeability
+    for tolerance in (1e-3, 1e-4):
+        coarse = flow(FIBRES, (20, 20, 20), tolerance=tolerance).permeability
+        assert abs(coarse / fine - 1) < 100 * tolerance**2
+
+
 def test_permeability_is_a_symmetric_tensor_and_the_flow_linear():
     tensor = permeability_tensor(FIBRES, *UNIT, (20, 20, 20), tolerance=TIGHT)
     assert abs(tensor - tensor.T).max() < 1e-7 * tensor.trace()

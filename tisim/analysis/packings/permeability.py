@@ -12,7 +12,7 @@ from tisim.analysis.packings.shape_integrals import surface_areas
 from tisim.errors import must
 from tisim.sources.flow import kozeny_carman
 from tisim.sources.pore_flow.solids import SolidBody, SolidCylinder, SolidSphere
-from tisim.sources.pore_flow.stokes_flow import TOLERANCE, permeability_tensor
+from tisim.sources.pore_flow.stokes_flow import WALL_TOLERANCE, permeability_tensor
 
 KOZENY_CONSTANT = 5.0
 """The constant C of random packings (P. C. Carman, Trans. Inst. Chem. Eng. 15 (1937) 150)."""
@@ -69,7 +69,7 @@ def solid_bodies(packing: PackedBodies) -> list[SolidBody]:
 
 
 def stokes_permeability(
-    packing: PackedBodies, cells: Sequence[int], tolerance: float = TOLERANCE
+    packing: PackedBodies, cells: Sequence[int], tolerance: float = WALL_TOLERANCE
 ) -> np.ndarray:
     """Return the permeability of a periodic packing of spheres or rods, K in U = -K/eta grad p, m^2, shape
     (3, 3), from the slow flow of a fluid through it; see ``tisim.sources.stokes_flow``.

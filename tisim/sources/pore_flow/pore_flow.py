@@ -19,7 +19,7 @@ from tisim.sources.base import Source, option, parameter
 from tisim.sources.magnetic.cylinder import Cylinder
 from tisim.sources.magnetic.sphere import Sphere
 from tisim.sources.pore_flow.solids import Column, Grid, SolidBody, SolidCylinder, SolidSphere
-from tisim.sources.pore_flow.stokes_flow import TOLERANCE, TOLERANCES, stokes_flow
+from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stokes_flow
 
 AXIS_NAMES = ("x", "y", "z")
 KEPT_BYTES = 500_000_000
@@ -110,7 +110,7 @@ class PoreFlow(Source):
         "velocity outside of the box: of its periodic images, or the superficial velocity", "periodic"
     )
     tolerance: float = parameter(
-        "", "velocity at walls over the mean velocity", TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
+        "", "velocity at walls over the mean velocity", WALL_TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
     )
 
     if TYPE_CHECKING:

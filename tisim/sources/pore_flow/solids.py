@@ -172,13 +172,13 @@ class Grid:
         least = np.full(self.shape, 4.0 * self.spacing.max() * WINDOW_CELLS)
         if self.column == "tube":
             out = []
-            for b in np.flatnonzero(self.walled):
+            for b in (axis for axis in range(3) if self.walled[axis]):
                 period = self.shape[b] * self.spacing[b]
                 from_middle = places[b] - 0.5 * (self.low[b] + high[b])
                 out.append(self._along(b, from_middle - period * np.rint(from_middle / period)))
             radius = 0.5 * min((high - self.low)[np.flatnonzero(self.walled)])
             return np.broadcast_to(radius - np.hypot(*out), self.shape).copy()
-        for b in np.flatnonzero(self.walled):
+        for b in (axis for axis in range(3) if self.walled[axis]):
             again = self.low[b] + self.shape[b] * self.spacing[b]
             inside = np.minimum(places[b] - self.low[b], high[b] - places[b])
             within = np.where(
