@@ -15,7 +15,7 @@ volume 1/n around each. Each stage takes the time in which the flow passes the d
 Each is computed for the colloids of a size and averaged over the sizes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -29,6 +29,8 @@ from tisim.sources import Cylinder
 
 START_MARGIN = 5.0
 """Distance from the fibre within which colloids start, D. Fibres attract them from less than that."""
+LONE_RESOLUTION = 3.0
+"""Largest number of cells over D of the flow around a lone fibre."""
 SIZE_CLASSES = 6
 """Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
 
@@ -83,15 +85,18 @@ def lone_fibres(
     """Run lone fibres in random directions with the settings of a filter; RunError if a run fails."""
     axes = Rotation.random(fibres, rng=np.random.default_rng([seed, 0x10E])).apply([0.0, 0.0, 1.0])
     matrix = filter.matrix
-    scenes, sizes = [], []
+    # One box for all directions, so that all are worlds of one batch.
+    half = START_MARGIN * matrix.diameter + 0.5 * (matrix.length + matrix.diameter)
+    box = Box(
+        low=(-half, -half, -half), high=(half, half, half), periodic=(False, False, False), images=False
+    )
+    own = np.pi / 4 * matrix.diameter**2 * matrix.length
+    size = 8 * half**3 - own if filter.mode == "static" else 4 * half**2
+    coarse = replace(filter, resolution=min(filter.resolution, LONE_RESOLUTION))
+    scenes = []
     for k, axis in enumerate(axes):
-        half = START_MARGIN * matrix.diameter + 0.5 * (matrix.length * np.abs(axis) + matrix.diameter)
-        a, b, c = (float(x) for x in half)
-        box = Box(low=(-a, -b, -c), high=(a, b, c), periodic=(False, False, False), images=False)
         body = Cylinder(axis=tuple(axis.tolist()), radius=matrix.diameter / 2, length=matrix.length)
-        scenes.append(filter.scene_about((body,), (magnetised(body, filter.field()),), box, seed + k))
-        own = np.pi / 4 * matrix.diameter**2 * matrix.length
-        sizes.append(8 * a * b * c - own if filter.mode == "static" else 4 * a * b)
+        scenes.append(coarse.scene_about((body,), (magnetised(body, filter.field()),), box, seed + k))
     results = sound(run(scenes, progress))
     radius, at = (np.array([result.state[name] for result in results]) for name in ("radius", "captured_at"))
-    return LoneFibre(filter, np.array(sizes), radius, at)
+    return LoneFibre(filter, np.full(fibres, size), radius, at)

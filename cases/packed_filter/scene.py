@@ -55,7 +55,7 @@ IMAGE_REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
 LONGEST_MOVE = 0.05
 """Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D."""
-FIELD_DIGITS = 3
+FIELD_DIGITS = 2
 """Number of digits of the field; random motion outweighs this error."""
 APPROACH = 1.0
 """Distance of the faces at which colloids enter and leave from the matrix, in lengths of a fibre."""

@@ -81,6 +81,7 @@ def test_the_flow_has_the_superficial_velocity_and_rests_in_fibres(filter):
     assert np.linalg.norm(inner) < 1e-3 * filter.speed
 
 
+@pytest.mark.slow
 def test_no_colloid_is_lost_and_most_are_released(result):
     assert result.status.ok
     assert missing([result]) == 0
