@@ -67,7 +67,7 @@ CLEAR = 1.001
 Mode = Literal["static", "dynamic"]
 Flow = Literal["resolved", "uniform"]
 
-SEARCH: dict[str, Any] = {"options": {"population": 12}, "ensemble": {"confirm": 8}}
+SEARCH: dict[str, Any] = {"options": {"population": 8, "first": 12}, "ensemble": {"confirm": 8}}
 """Settings of searches of every size."""
 SIZES = {
     "small": Size(

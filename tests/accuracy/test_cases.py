@@ -13,7 +13,15 @@ from tisim.cases.vibration import scene as vibration
 from tisim.sources import ElectricField
 
 
-@pytest.mark.parametrize("name", sorted(name for name, case in every().items() if case.quantities))
+@pytest.mark.parametrize(
+    "name",
+    [
+        # The start of a packed filter is a packing and its field, which take long.
+        pytest.param(name, marks=pytest.mark.slow if name == "packed_filter" else ())
+        for name, case in sorted(every().items())
+        if case.quantities
+    ],
+)
 def test_every_size_of_every_case_names_its_quantities(name):
     case = every()[name]
     for size in case.sizes:

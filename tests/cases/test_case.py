@@ -40,6 +40,9 @@ def test_a_case_has_a_scene_of_its_own_for_some_variants():
 ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pictures": (None,),
              "figures": ("default", None), "calibration": ("default", "", None)}  # fmt: skip
 
+PACKED = ("packing", "packed_filter")
+"""Cases whose starts are packings, which take long."""
+
 
 @pytest.mark.parametrize("name", every())
 def test_late_imports_of_a_case_exist_and_accept_their_arguments(name):
@@ -49,7 +52,9 @@ def test_late_imports_of_a_case_exist_and_accept_their_arguments(name):
         inspect.signature(late.function).bind(*ARGUMENTS[field])
 
 
-@pytest.mark.parametrize("name", every())
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in PACKED else ()) for name in every()]
+)
 def test_every_scene_of_moderate_size_has_a_valid_start(name):
     """Its effects accept its initial state; nothing is compiled."""
     case, begun = every()[name], 0

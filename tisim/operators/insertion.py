@@ -13,14 +13,14 @@ from tisim.components.component import Vector
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Materials
 from tisim.numerics import philox
-from tisim.numerics.random_streams import CORE_MOMENTS, INSERTION
+from tisim.numerics.random_streams import INSERTION
 from tisim.numerics.vectors import random_orientation
 from tisim.operators.base import AddsParticles, option, parameter
 from tisim.operators.filled_region import FilledRegion
 from tisim.operators.grain_shapes import GrainShapes
 from tisim.operators.tried_place import TriedPlace
 from tisim.packing.grains import check_quantities, class_materials, further_quantities
-from tisim.packing.magnetic_core import core_moments
+from tisim.packing.magnetic_core import core_moments, core_normal
 from tisim.program.phases import WorldAction
 from tisim.state.bound import Bound
 from tisim.state.fields import WorldField
@@ -239,7 +239,7 @@ class Insertion(GrainShapes, FilledRegion, UsesMaterials, AddsParticles):
                 given[0][w, i] = ti.cast(self.given[c, given[1]], given[0].dtype)
         if ti.static(self.has_cores):
             k = ti.cast(self.inserted[w], ti.i32)
-            normal = philox.normal(philox.bits(s.seed[w], CORE_MOMENTS, k, self.index))[0]
+            normal = core_normal(s.seed[w], k, self.index)
             saturation, domain = core_moments(self.cores, c, s.radius[w, i], normal)
             s.saturation_moment[w, i] = ti.cast(saturation, s.real)
             if ti.static(self.has_domains):

@@ -1,12 +1,10 @@
 """The magnetic core of a grain: moments that follow from the grain's own radius (B16 Eq. 7.6)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Component, parameter
-from tisim.numerics import elementary
+from tisim.numerics import elementary, philox
 from tisim.numerics.random_streams import CORE_MOMENTS
 
 CORE_QUANTITIES = ("domain_moment", "saturation_moment")
@@ -70,6 +68,12 @@ def core_moments(row: ti.template(), c, radius, normal):  # type: ignore[valid-t
     spread = elementary.exp(row[c, 2] * normal)
     saturation = row[c, 0] * (4.0 / 3.0 * ti.math.pi) * inner * inner * inner * spread
     return saturation, ti.min(saturation, row[c, 3])
+
+
+@ti.func
+def core_normal(seed, number, index):
+    """Return the normal number Z of a grain that is inserted, by its number in the insertion of an index."""
+    return philox.normal(philox.bits(seed, CORE_MOMENTS, number, index))[0]
 
 
 def core_normals(number: int, seed: int) -> np.ndarray:

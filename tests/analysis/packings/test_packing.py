@@ -11,6 +11,7 @@ from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.steppers import MechanicalContraction
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_the_packing_at_the_end_of_a_contraction(rng):
     rod, number, side = SpherocylinderShape(length=0.5, diameter=1.0), 40, 6.0

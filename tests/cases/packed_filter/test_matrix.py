@@ -61,6 +61,7 @@ def test_all_images_near_the_matrix_are_there(bulk):
     assert missing == 0
 
 
+@pytest.mark.slow
 def test_a_fraction_beyond_jamming_is_refused():
     with pytest.raises(InputError, match=r"fraction of fibres must be at most 0\.[45]\d\d for fibres"):
         Matrix(aspect=2.0, fraction=0.6).fibres()

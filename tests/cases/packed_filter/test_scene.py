@@ -56,6 +56,7 @@ def test_sizes_and_moments_are_those_of_the_ferrofluid():
     np.testing.assert_allclose(moment, 4.46e5 * 4 / 3 * np.pi * radius**3, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_neighbours_change_the_magnetisation_and_images_have_that_of_their_fibres(filter):
     number = filter.matrix.number
     every = np.array([one.magnetisation for one in filter.magnets()])
@@ -95,6 +96,7 @@ def test_no_colloid_is_lost_and_most_are_released(result):
     assert result.state["captured_at"].max() <= 80.5
 
 
+@pytest.mark.slow
 def test_the_small_scene_is_dynamic_and_the_static_one_is_periodic():
     dynamic, static = scene_for("small", 0), filter_of("small", "static").scene(0)
     assert {one.kind() for one in dynamic.effects} - {one.kind() for one in static.effects} == {

@@ -74,6 +74,7 @@ def test_short_rods_are_denser_than_spheres_and_two_sizes_denser_than_one():
     assert 0.6 < np.mean(spheres) < 0.64
 
 
+@pytest.mark.slow
 def test_surface_and_permeability_are_of_the_designed_size():
     spheres, wide, long = packed(
         "permeable",

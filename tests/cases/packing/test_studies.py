@@ -51,6 +51,7 @@ def line(found, subject):
     return one
 
 
+@pytest.mark.slow
 def test_rows_of_a_study():
     """A table is read as it was written; a container is filled to the volume between its walls."""
     free, narrow = plans("aspect ratio")[0], PackedPlan("cylinder", 1.0, width=1.1)
@@ -144,6 +145,7 @@ def test_wedges_beside_b16():
     assert [float(one) for one in first.get_ydata()] == pytest.approx([0, 1], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_rods_and_superballs_beside_b16():
     rods = [*FREE, *(row("aspect ratio", 3.0, seed, "revised", contacts=6.5) for seed in range(3))]
     found = compared("aspect ratio", rods)
@@ -192,6 +194,7 @@ def test_contacts_of_a_row_of_spheres():
     assert contact_counts(bodies).tolist() == [1, 2, 2, 1]
 
 
+@pytest.mark.slow
 def test_pictures_of_packings():
     """Packings of the first seed are drawn, of a cylinder one segment; rods in a wedge by direction."""
     plans_of = [

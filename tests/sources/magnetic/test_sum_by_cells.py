@@ -80,6 +80,7 @@ def test_fibres_of_different_shapes(rng):
     assert max(errors(cylinders, about(rng, cylinders), sum_digits=3)) < 1e-3
 
 
+@pytest.mark.slow
 def test_with_tabulated_ends(rng):
     """Near cylinders are read from the table; their relative error adds to the error of the cells."""
     cylinders = fibres(rng, 12)
@@ -94,6 +95,7 @@ def test_with_tabulated_ends(rng):
     assert off.max() > 1e-7 * typical(cylinders)[0]
 
 
+@pytest.mark.slow
 def test_worlds_with_different_fibres(rng):
     """Worlds of a batch with other numbers of fibres equal worlds alone to the last bit; a world without
     fibres has no field."""
@@ -113,6 +115,7 @@ def test_worlds_with_different_fibres(rng):
     assert (b[1] == 0).all()
 
 
+@pytest.mark.slow
 def test_laws_of_maxwell_and_differences(rng):
     """The gradient is symmetric and traceless, and equals differences of the field within a cell."""
     cylinders = fibres(rng, 15)
@@ -157,6 +160,7 @@ def test_a_full_list_of_near_cylinders(rng, monkeypatch):
     cell_sum._cell_row.cache_clear()
 
 
+@pytest.mark.slow
 def test_tolerances_are_lowered_until_the_error_is_small(rng, monkeypatch):
     cylinders = fibres(rng, 10)
     cell_sum._cell_row.cache_clear()

@@ -161,6 +161,7 @@ def test_flows_of_one_matrix_are_solved_once(monkeypatch):
     assert len(pore_flow._solved) == 1
 
 
+@pytest.mark.slow
 def test_worlds_of_a_batch_have_their_own_matrices(rng):
     """Also of other numbers of bodies, directions and boxes."""
     sources = [
@@ -210,6 +211,7 @@ def test_walls_hold_the_fluid_and_space_beyond_is_at_rest():
     assert abs(velocity[:, 1:]).max() < 1e-4 * MM
 
 
+@pytest.mark.slow
 def test_the_speed_at_a_surface_falls_with_the_spacing(rng):
     """It is of second order, and particles that follow the fluid hardly cross a surface."""
     z = rng.uniform(-0.4, 0.4, 500)
@@ -250,6 +252,7 @@ def drifting(source, domain=None, radius=1e-6):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_light_particle_follows_the_fluid():
     (result,) = simulate([drifting(flow())], capacity=4)
     velocity, _ = sample((flow(),), "flow_velocity", result.state["position"])

@@ -175,6 +175,7 @@ def test_superquadrics_pack_at_a_higher_density_than_spheres(shape):
     assert deepest(result.state, made.domain.high[0], shape, result.state["radius"][0]) < ROUNDING
 
 
+@pytest.mark.slow
 def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     scenes = [scene(ROD, 100 + k, 0.1, seed=k, duration=700.0) for k in range(3)]
     usual = same_bits(scenes, tmp_path, 417)

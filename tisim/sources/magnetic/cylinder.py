@@ -1,7 +1,5 @@
 """The magnetic field of any number of uniformly magnetised cylinders at any place (B16 chapter 5)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 

@@ -9,8 +9,6 @@ In a cell with centre c and half side h, the potential is h sum_k a_k R_k((r - c
 harmonics R_k, and B is its gradient.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The flow of a fluid through a matrix of fibres and spheres, as a source that drag laws use."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
