@@ -63,6 +63,7 @@ def run(*scenes):
     return results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [1.5, 0.5, 0.0, -0.1])
 def test_a_gap_narrower_than_the_particle(part):
     """Particles start between two balls with a gap of ``part`` radii, below 0 for balls that overlap. In a

@@ -120,6 +120,7 @@ def test_moments_are_given_once_and_for_all(grains, rule):
         MagneticCore(magnetisation=1.0, ratio=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_inserted_particles_have_moments_by_their_radius():
     """With ratio and domain; and without, as ``domain_moment`` is then the saturation moment of each."""

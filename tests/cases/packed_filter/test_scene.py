@@ -69,6 +69,7 @@ def test_neighbours_change_the_magnetisation_and_images_have_that_of_their_fibre
     assert {tuple(one) for one in every[number:]} <= known
 
 
+@pytest.mark.slow
 def test_the_flow_has_the_superficial_velocity_and_rests_in_fibres(filter):
     scene = filter.scene(0)
     flow = next(one for one in scene.effects if isinstance(one, PoreFlow))

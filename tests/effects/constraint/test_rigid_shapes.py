@@ -194,6 +194,7 @@ def test_an_elastic_collision_keeps_energy_momentum_and_angular_momentum(name):
     assert errors[2] < 0.3 * errors[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK_SHAPES)
 def test_friction_and_rolling_keep_momentum_and_angular_momentum(name):
     (result,) = simulate([colliding(SHAPES[name], LAW)])
@@ -204,6 +205,7 @@ def test_friction_and_rolling_keep_momentum_and_angular_momentum(name):
     assert 0.2 < energy(end) / energy(start) < 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK_SHAPES)
 def test_restitution_holds_wherever_a_body_hits_a_floor(name):
     """Without friction the impulse is J = (1 + e) u / (1/m + (r x n) I^-1 (r x n)), for a point of contact r
@@ -269,6 +271,7 @@ def test_rods_of_length_0_are_spheres():
     np.testing.assert_allclose(np.log2(np.divide(*errors)), 1.0, atol=0.2)
 
 
+@pytest.mark.slow
 def test_a_rod_falls_and_comes_to_rest_on_both_ends():
     rest = AtRest(energy=1e-9, unbalanced=1e-3, time=0.01)
     lean = Rotation.from_rotvec([0, np.pi / 2 - 0.4, 0]).as_quat(scalar_first=True)
@@ -459,6 +462,7 @@ def test_a_world_stops_if_bodies_may_pass_through_each_other(moves, slower):
     assert reason(slower * motion) == "reached its end"
 
 
+@pytest.mark.slow
 def test_steps_are_limited_by_the_mobility_of_the_point_of_contact():
     """Steps must be below 2 sqrt(m*/k), at an end of a rod 0.63 of the limit for its mass."""
     stiffness, lean, law = 1000.0, 0.6, Granular(normal=Hooke())

@@ -197,6 +197,7 @@ def in_this_precision():
     return [float(max(errors(cylinders, points, sum_digits=digits))) for digits in (3, 4)]
 
 
+@pytest.mark.slow
 def test_single_precision(single):
     """Cells have their stated accuracy in f32."""
     three, four = single("sources.magnetic.test_sum_by_cells", "in_this_precision")

@@ -224,6 +224,7 @@ def test_a_packing_has_no_overlaps_with_bodies_or_walls(shape, container, treatm
     assert gaps(result) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("container", [CYLINDER, WEDGE], ids=lambda one: one.kind())
 def test_energy_minimisation_packs_between_walls(container):
     made = scene(container, SPHERE, 60, fraction=0.2, stepper=EnergyMinimisation())
@@ -248,6 +249,7 @@ def test_both_treatments_move_spheres_alike():
     np.testing.assert_allclose(*states, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("container", CONTAINERS, ids=lambda one: one.kind())
 def test_a_container_grows_with_its_bodies(container):
     """In a contraction without overlaps bodies move along the scaled axes alone, away from the middle of the
@@ -302,6 +304,7 @@ def placed(shape, container, position, axes, box, **settings):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [0.0, 2.0])
 def test_a_single_file_in_the_narrowest_cylinder(length):
     """In a cylinder of the diameter D a row of rods ends at phi = (4/3 R + L)/(2 R + L), spheres at 2/3."""
@@ -315,6 +318,7 @@ def test_a_single_file_in_the_narrowest_cylinder(length):
     assert closed - 2e-4 < fraction(result) < closed * (1 + 2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [9.0, 45.0])
 def test_a_single_row_in_the_smallest_wedge(degrees):
     """A row of rods along the slope touches all three walls (2.12), and ends at the packing fraction of

@@ -206,6 +206,7 @@ def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_ove
         assert result.measures["packing_fraction"] == pytest.approx(fraction(result, ROD), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     scenes = [scene(ROD, 100 + k, 0.1, seed=k, duration=60.0, method="original") for k in range(3)]
     same_bits(scenes, tmp_path, 17)
@@ -252,6 +253,7 @@ def test_quaternions_and_shapes_of_a_start_are_checked():
             made.effects[0].check_start(start, made)
 
 
+@pytest.mark.slow
 def test_shapes_may_be_given_for_each_body():
     kinds, shapes = np.arange(60) % 2, (ROD, SPHERE)
     bounding = np.array([one.bounding_radius() for one in shapes])
@@ -316,6 +318,7 @@ def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():
     assert "overlaps of the start were not removed" in result.status.reason
 
 
+@pytest.mark.slow
 def test_a_resumed_run_returns_to_its_last_configuration(tmp_path):
     made = scene(SPHERE, 100, 0.45, duration=1e5, attempts=60, volume_step=8.0, method="original", halvings=1)
     result = resumed(made, tmp_path)
