@@ -106,6 +106,7 @@ def test_diffusion_and_drift_do_not_depend_on_the_step(a):
     check_variance(v[:, 1] - terminal, SPEED**2, a)
 
 
+@pytest.mark.slow
 def test_trapped_particles_have_the_variance_kt_over_k_at_any_step():
     """0.42 of the critical step. Schemes with half of the noise on each side of the drift give 1.21."""
     trials = [(0.2, 0.7), (2.0, 0.7), (10.0, 0.7), (10.0, 0.1)]

@@ -43,6 +43,7 @@ def suspension(seed, number=40, **more):
     return particles(0.5, 30, number, place, extra=(shell,), domain=BOX, seed=seed, **more)
 
 
+@pytest.mark.slow
 def test_same_bits_on_both_schedules_alone_in_portions_and_resumed(tmp_path):
     scenes = [suspension(seed) for seed in range(3)]
     usual = simulate(scenes, worlds=3, schedule="particle")

@@ -14,6 +14,7 @@ pytestmark = pytest.mark.long
 MATRIX = Matrix(aspect=2.0, fraction=0.2)
 
 
+@pytest.mark.slow
 def test_fibres_fill_their_fraction_without_overlaps():
     fibres = MATRIX.fibres()
     volume = sum(np.pi * one.radius**2 * one.length for one in fibres)
@@ -35,6 +36,7 @@ def test_fibres_fill_their_fraction_without_overlaps():
     assert abs(np.linalg.eigvalsh(axis.T @ axis / len(axis)) - 1 / 3).max() < 0.25
 
 
+@pytest.mark.slow
 def test_layers_are_copies_along_the_flow():
     one, two = MATRIX.fibres(), Matrix(aspect=2.0, fraction=0.2, layers=2).fibres()
     assert two[: len(one)] == one
@@ -42,6 +44,7 @@ def test_layers_are_copies_along_the_flow():
         np.testing.assert_allclose(np.subtract(second.centre, first.centre), [0, 0, MATRIX.side], atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bulk", [False, True])
 def test_all_images_near_the_matrix_are_there(bulk):
     """Points of the surfaces of all images of three periods that are within reach belong to an image."""

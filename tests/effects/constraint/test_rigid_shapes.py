@@ -153,6 +153,7 @@ def test_two_bodies_collide_as_in_a_numpy_reference(name):
     assert errors[1] < 0.3 * errors[0]
 
 
+@pytest.mark.slow
 def test_rods_stick_by_springs_as_in_a_numpy_reference():
     """A spring without slip. It begins at the end of the step in which the rods meet, so the error is between
     0 and a limit of first order in dt."""

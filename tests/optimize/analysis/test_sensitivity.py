@@ -129,6 +129,7 @@ def test_intervals_have_their_coverage(name):
     assert np.all(parts > 0.93 - 1.96 * errors)
 
 
+@pytest.mark.slow
 def test_intervals_hold_where_the_function_is_steeper_than_elsewhere():
     """Without the factor of the residuals 0.57 of the intervals of 1 %
     hold, and 0.77 of those of 10 %."""

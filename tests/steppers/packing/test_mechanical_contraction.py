@@ -195,6 +195,7 @@ def test_a_packing_has_no_overlaps_and_cannot_be_contracted(shape, method, attem
     assert -0.01 < depth <= 1e-4 * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_overlaps():
     for duration in (60.0, 95.0, 130.0):
         made = scene(ROD, 100, 0.05, duration=duration, method="original")
