@@ -2,8 +2,8 @@
 and those that divide colloids most sharply by size.
 
 A design is the diameter, the aspect ratio and the solid fraction of the fibres, and the field. In the variant
-"pressure" all designs let the same flow through a matrix of the same depth: the front of captured fraction
-and pressure drop is what the builder of a filter chooses from. In the variant "select" the speed of the flow
+"pressure" all designs let the same flow through a matrix of the same depth, and the search finds the front of
+captured fraction and pressure drop. In the variant "select" the speed of the flow
 is a gene as well, and a filter is wanted that captures colloids larger than ``CUT`` and lets smaller ones
 pass: of the captured fractions of both, the difference is maximised.
 
@@ -146,7 +146,7 @@ def details(design: Mapping[str, float], result: Result) -> Mapping[str, float]:
     """Return further properties of a design."""
     large = result.state["radius"] > CUT
     return {
-        "fibres": float(Matrix(design["diameter"], design["aspect"], design["fraction"]).number),
+        "fibres": float(designed(design, 0, number=1).matrix.number),
         "depth of the matrix that was run, mm": 1e3 * depth(result),
         "captured fraction in it": captured_fraction(result),
         f"captured fraction above {1e9 * CUT:g} nm, {1e3 * DEPTH:g} mm": captured(result, large),

@@ -71,7 +71,7 @@ SEARCH: dict[str, Any] = {"options": {"population": 8, "first": 12}, "ensemble":
 """Settings of searches of every size."""
 SIZES = {
     "small": Size(
-        "25 fibres of L/D = 2 and 200 colloids, which enter for 40 s; the field is switched off at 150 s",
+        "30 fibres of L/D = 2 and 200 colloids, which enter for 40 s; the field is switched off at 150 s",
         {"aspect": 2.0, "number": 200, "feed": 40.0, "field_end": 150.0, "duration": 300.0},
         {"generations": 8, "max_evaluations": 80, **SEARCH},
     ),
@@ -151,7 +151,7 @@ class PackedFilter:
         return self.flux, 0.0, 0.0
 
     def magnets(self) -> tuple[Cylinder, ...]:
-        """Return the magnetised fibres: those of the matrix, and after them their images."""
+        """Return the magnetised fibres of the matrix, followed by their images."""
         return _magnets(self.matrix, self.field(), self.mode == "static", self.mutual)
 
     def box(self) -> Box:

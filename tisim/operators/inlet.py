@@ -48,7 +48,7 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
     ``begin`` to ``end`` is a pulse, a long one a step of the concentration.
 
     Particles that diffuse back through the upstream face of the region are reflected there: the flux into the
-    region is exactly that of the feed (P. V. Danckwerts, Chem. Eng. Sci. 2 (1953) 1).
+    region equals the feed (P. V. Danckwerts, Chem. Eng. Sci. 2 (1953) 1).
 
     ``work["entered"]`` is the number of particles that have entered, and ``entered_at`` is the time for each
     (s), -1 before. ``measures`` have the numbers of particles at this time: ``waiting_particles``,
