@@ -1,9 +1,10 @@
 """Calibration: the 95 % interval of each gene from measurements, and genes that cannot be distinguished.
 
-It needs a problem whose objective is the Misfit of measured quantities. A quadratic form is fitted to the
-chi^2 of the designs of the search (optimize.analysis.misfit_shape). It gives the estimate of each gene, its
-95 % interval and the correlations. The interval is a likelihood interval: it is valid if the uncertainties of
-the measurements are right and their errors are normal and independent.
+It needs a problem whose objective is the Misfit of measured quantities. The responses of the quantities to
+the genes, from the designs of the search, give the likelihood of the genes (optimize.analysis.likelihood): the
+estimate of each gene, its 95 % interval and the correlations. The interval is a likelihood interval: it is
+valid if the uncertainties of the measurements are right and their errors are normal and independent. It
+includes the error of the responses, which is large where few designs were run.
 """
 
 from __future__ import annotations
@@ -18,14 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
 from tisim.errors import Words, must
-from tisim.optimize.analysis.misfit_shape import (
-    NEAR_CHI2,
-    ONE_GENE_95,
-    Evidence,
-    MisfitShape,
-    coefficients,
-    fit,
-)
+from tisim.optimize.analysis.likelihood import ONE_GENE_95, Evidence, Likelihood
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.feasibility import excess
 from tisim.optimize.problem.gene_values import Value, brief
@@ -41,6 +35,9 @@ _ALMOST_ALL = 0.95
 """A gene is undetermined if its interval covers a larger part of its range than this."""
 _TOGETHER = 0.9
 """Correlations of two estimates from this magnitude on are mentioned in the remarks."""
+_COARSE = 0.7
+"""Runs at the end of an interval are proposed if the error of a response there is larger than this, in
+uncertainties of the measurement."""
 _LITTLE = 0.05
 """A gene with a smaller share in the undetermined directions than this is not listed with them."""
 _UNLIKELY = 0.01
@@ -52,7 +49,7 @@ met."""
 class GeneEstimate:
     """The estimate of a gene and its 95 % interval, in the unit of the gene.
 
-    estimate : the value of least chi^2.
+    estimate : the most likely value.
     low, high : ends of the 95 % interval.
     open_low, open_high : whether the interval extends to that end of the gene's range, and possibly beyond;
         it is then a one-sided bound.
@@ -100,10 +97,11 @@ class Calibration:
     choices : for each gene that is a choice, the choices of all designs whose chi^2 is less than 3.84 above
         the least.
     correlation : of the estimates, shape (genes, genes); NaN for an undetermined gene.
-    chi2 : the least chi^2, of ``measurements`` quantities.
-    designs : number of designs in the fit.
-    missing : number of further designs near the least misfit that are needed for a fit.
-    wanted : that number of designs, proposed for running.
+    chi2 : the least chi^2, of ``measurements`` quantities; the variances contain the errors of the responses.
+    designs : number of designs that the responses are known from.
+    missing : number of further designs near the least misfit that are needed for intervals.
+    wanted : designs proposed for running: that number; or the ends of intervals that are wide because few
+        designs were run there.
     remarks : sentences on genes that cannot be distinguished, and on reasons to doubt the intervals.
     """
 
@@ -140,34 +138,38 @@ def calibration(outcome: Outcome) -> Calibration:
     best = points[allowed][int(np.argmin(evidence.chi2[allowed]))]
     same = np.all(points[:, others] == best[others], axis=1)
     choices = _choices(problem, points[allowed], evidence.chi2[allowed], others)
-    shape = None
-    if numbers:
-        near = evidence.chi2[same], evidence.noise[same]
-        shape = fit(Evidence(points[same][:, numbers], *near, evidence.shift))
-    missing = 0
-    if numbers and shape is None:
-        missing = 2 * coefficients(len(numbers))
-        missing -= int(np.sum(evidence.chi2[same] < evidence.chi2.min() + NEAR_CHI2))
-    wanted = _wanted(problem, points[same], evidence.chi2[same], numbers, max(missing, 0))
-    if shape is None:
-        remarks = (
-            [f"Too few designs are near the least misfit: {missing} more are needed."] if numbers else []
-        )
+    near = evidence.of(same, numbers)
+    missing = near.missing if numbers else 0
+    if missing or not numbers:
+        remarks = [f"Too few designs are near the least misfit: {missing} more are needed."] if missing else []
+        wanted = _wanted(problem, points[same], near.chi2, numbers, missing)
         return Calibration((), choices, np.empty((0, 0)), float(evidence.chi2.min()),
                            measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
+    likelihood = Likelihood(near)
     searched = [genome.searched[k] for k in numbers]
-    estimates = tuple(_estimate(gene, shape, k) for k, gene in enumerate(searched))
+    ends = [likelihood.interval(k) for k in range(len(numbers))]
+    estimates = tuple(
+        _estimate(gene, *(float(at[k]) for at in (likelihood.best, *ends[k])))
+        for k, gene in enumerate(searched)
+    )
+    unknown, wide = _unknown(measured, likelihood, ends)
+    wanted = []
+    for end in wide:
+        at = best.copy()
+        at[numbers] = end
+        wanted.append(genome.decode(at))
     return Calibration(
         genes=estimates,
         choices=choices,
-        correlation=_correlation(shape),
-        chi2=max(shape.least, 0.0),
+        correlation=_correlation(likelihood),
+        chi2=likelihood.chi2,
         measurements=measurements,
-        designs=shape.designs,
+        designs=likelihood.designs,
         missing=0,
-        wanted=(),
+        wanted=tuple(wanted),
         remarks=(
-            *_remarks(measurements, shape, searched, estimates, evidence),
+            *_remarks(measurements, likelihood, searched, estimates),
+            *unknown,
             *_violating(outcome, evidence),
         ),
     )
@@ -200,12 +202,27 @@ def _evidence(outcome: Outcome, measured: Misfit) -> tuple[Array, Evidence]:
     return points, Evidence.of_quantities(points, off, bool(outcome.settings.ensemble.common_starts))
 
 
-def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
-    low, high = shape.interval(k)
-    ends = max(low, 0.0), min(high, 1.0)
-    best = float(np.clip(shape.best[k], 0.0, 1.0))
-    at, bottom, top = (float(gene.decode(u)) for u in (best, *ends))
-    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, *ends)
+def _estimate(gene: Searched, best: float, low: float, high: float) -> GeneEstimate:
+    at, bottom, top = (float(gene.decode(u)) for u in (best, low, high))
+    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, low, high)
+
+
+def _unknown(
+    measured: Misfit, likelihood: Likelihood, ends: Sequence[tuple[Array, Array]]
+) -> tuple[list[str], list[Array]]:
+    """Return a remark if intervals are wide because few designs were run at their ends, and these ends."""
+    points = [end for pair in ends for end in pair]
+    errors = np.array([likelihood.unknown(point) for point in points])
+    wide = np.any(errors > _COARSE, axis=1)
+    if not np.any(wide):
+        return [], []
+    worst = int(np.argmax(errors.max(axis=0)))
+    quantity = tuple(measured.quantities)[worst]
+    words = (
+        f"Few designs were run near the ends of the intervals, where {quantity} is known to "
+        f"{errors[:, worst].max():.2g} uncertainties of its measurement: runs there would narrow the intervals."
+    )
+    return [words], [point for point, is_wide in zip(points, wide, strict=True) if is_wide]
 
 
 def _choices(
@@ -234,21 +251,21 @@ def _wanted(
 
 def _remarks(
     measurements: int,
-    shape: MisfitShape,
+    likelihood: Likelihood,
     genes: Sequence[Searched],
     estimates: Sequence[GeneEstimate],
-    evidence: Evidence,
 ) -> list[str]:
     """Return remarks on genes that cannot be distinguished, and on reasons to doubt the intervals."""
     remarks = []
-    growth, directions = shape.growth()
+    growth, directions = likelihood.growth()
+    correlation = likelihood.correlation
     free = growth < UNTOLD
     if np.any(free):
         remarks += _untold(directions[:, free], float(growth[free].max()), genes)
     known = {one.name for one in estimates if one.told}
     for i, one in enumerate(genes):
         for j, other in enumerate(genes[:i]):
-            rho = shape.correlation[i, j]
+            rho = correlation[i, j]
             if abs(rho) > _TOGETHER and {one.name, other.name} <= known:
                 more = "less" if rho < 0 else "more"
                 remarks.append(
@@ -256,27 +273,22 @@ def _remarks(
                     f"the other (correlation {rho:.2f})."
                 )
     freedom = max(measurements - len(genes), 1)
-    if chi2_distribution.sf(shape.least / (1.0 + evidence.shift), freedom) < _UNLIKELY:
+    if chi2_distribution.sf(likelihood.chi2, freedom) < _UNLIKELY:
         remarks.append(
-            f"The model does not meet all measurements: the least chi^2 is {shape.least:.3g} of "
+            f"The model does not meet all measurements: the least chi^2 is {likelihood.chi2:.3g} of "
             f"{measurements} quantities. The intervals are valid only if it can."
-        )
-    if not np.any(evidence.noise) and shape.scatter > 1.0:
-        remarks.append(
-            f"chi^2 deviates from a quadratic form by {shape.scatter:.2g} (root mean square) for "
-            f"designs up to {shape.within:.3g} above the least: the intervals are approximate."
         )
     return remarks
 
 
-def _correlation(shape: MisfitShape) -> Array:
+def _correlation(likelihood: Likelihood) -> Array:
     """Return the correlations of the estimates, NaN for a gene that is undetermined by itself.
 
     Such a gene fits equally well at any value, and its small correlations with others are due to chance.
     """
-    growth, directions = shape.growth()
+    growth, directions = likelihood.growth()
     alone = (directions[:, growth < UNTOLD] ** 2).sum(axis=1) > 1.0 - _LITTLE
-    correlation = shape.correlation.copy()
+    correlation = likelihood.correlation
     correlation[alone, :] = correlation[:, alone] = math.nan
     return correlation
 
@@ -330,7 +342,7 @@ def summary(result: Calibration) -> str:
         return "no intervals"
     return (
         f"least chi^2 {result.chi2:.3g} of {result.measurements} measured quantities, by "
-        f"{result.designs} designs near it"
+        f"{result.designs} designs"
     )
 
 
