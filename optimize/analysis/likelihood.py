@@ -4,13 +4,17 @@ Each measured quantity has a response to the genes (optimize.analysis.response).
 its uncertainty as the unit, mean q(u) and variance v(u) of the response at the design u, and the variance s
 due to random starts common to all designs,
 
-    -2 log L(u) = sum over the quantities of (q(u) - m)^2 / (1 + s + v(u)) + log(1 + s + v(u))
+    -2 log L(u) = chi^2(u) + sum over the quantities of log(1 + s + v(u))
+       chi^2(u) = sum over the quantities of (q(u) - m)^2 / (1 + s + v(u))
 
-The designs with -2 log L less than its minimum + 3.84 form the 95 % likelihood-ratio interval of one gene. v
-is large where no designs were run: the interval widens there.
+The estimate is the most likely design. The designs with chi^2 less than 3.84 above its value there form the
+95 % interval of one gene. With v = 0 this is the likelihood-ratio interval. v is large where no designs were
+run. The likelihood is small there, since few of the possible values of q are near m; but such designs are not
+excluded by any run, and chi^2 keeps them in the interval.
 
-Source: M. C. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425-464; interval: S. S. Wilks, Ann. Math.
-Stat. 9 (1938) 60-62.
+Source: M. C. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425-464; chi^2 as implausibility: I. Vernon,
+M. Goldstein and R. G. Bower, Bayesian Anal. 5 (2010) 619-669, section 3; interval for v = 0: S. S. Wilks, Ann.
+Math. Stat. 9 (1938) 60-62.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ these from which the maximum is searched."""
 _ROUNDING = 1e-5
 """An end of an interval this near to an end of the range is at it, in parts of the range."""
 _GOAL_MET = 0.01
-"""Deviation of -2 log L from 3.84 above its minimum that is accepted at an end of an interval."""
+"""Deviation of chi^2 from 3.84 above the most likely point that is accepted at an end of an interval."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,7 @@ class Evidence:
 class Likelihood:
     """The likelihood of the genes, points of the unit cube.
 
-    best : the most likely point. least : -2 log L there. chi2 : its first part there.
+    best : the most likely point. chi2 : chi^2 there.
     designs : number of designs that the responses are known from.
     """
 
@@ -125,10 +129,10 @@ class Likelihood:
         genes = points.shape[1]
         drawn = qmc.Sobol(genes, seed=1).random(_SAMPLES)
         self._seen = np.vstack([drawn, evidence.points[np.argsort(evidence.chi2)[:_SAMPLES]]])
-        self._values = self(self._seen)
-        begun = self._seen[np.argsort(self._values)[:_BEGUN]]
+        self._chi2, logarithms = self._parts(self._seen)
+        begun = self._seen[np.argsort(self._chi2 + logarithms)[:_BEGUN]]
         found = [self._minimised(point) for point in begun]
-        self.least, self.best = min(found, key=lambda one: one[0])
+        _, self.best = min(found, key=lambda one: one[0])
         self.chi2 = float(self._parts(self.best[None])[0][0])
 
     def __call__(self, points: Array) -> Array:
@@ -137,6 +141,7 @@ class Likelihood:
         return chi2 + logarithms
 
     def _parts(self, points: Array) -> tuple[Array, Array]:
+        """Return chi^2 and the sum of the logarithms at points (m, genes), both (m,)."""
         chi2, logarithms = np.zeros((2, len(points)))
         for response, shift in zip(self.responses, self.shift, strict=True):
             mean, variance = response.predict(points)
@@ -145,19 +150,20 @@ class Likelihood:
             logarithms += np.log(variance)
         return chi2, logarithms
 
-    def gradient(self, point: Array) -> Array:
-        """Return the gradient of -2 log L at a point, shape (genes,)."""
-        total = np.zeros(len(point))
+    def _gradients(self, point: Array) -> tuple[Array, Array]:
+        """Return the gradients of chi^2 and the sum of the logarithms at a point, both (genes,)."""
+        chi2, logarithms = np.zeros((2, len(point)))
         for response, shift in zip(self.responses, self.shift, strict=True):
             mean, variance = (float(one[0]) for one in response.predict(point))
             of_mean, of_variance = response.gradients(point)
             variance += 1.0 + shift
-            total += 2.0 * mean / variance * of_mean + (1.0 - mean**2 / variance) / variance * of_variance
-        return total
+            chi2 += 2.0 * mean / variance * of_mean - (mean / variance) ** 2 * of_variance
+            logarithms += of_variance / variance
+        return chi2, logarithms
 
     def _minimised(self, begin: Array) -> tuple[float, Array]:
         found = minimize(
-            lambda u: float(self(u[None])[0]), begin, jac=self.gradient, method="L-BFGS-B",
+            lambda u: float(self(u[None])[0]), begin, jac=lambda u: sum(self._gradients(u)), method="L-BFGS-B",
             bounds=[(0.0, 1.0)] * len(begin), options={"maxiter": 200, "ftol": 1e-12, "gtol": 1e-8},
         )  # fmt: skip
         return float(found.fun), np.clip(found.x, 0.0, 1.0)
@@ -165,14 +171,15 @@ class Likelihood:
     def interval(self, gene: int) -> tuple[Array, Array]:
         """Return the points with the smallest and the largest value of a gene in its 95 % interval.
 
-        They have -2 log L at most 3.84 above the minimum, with the other genes free within their ranges.
+        They have chi^2 at most 3.84 above the most likely point, with the other genes free within their
+        ranges.
         """
         return self._end(gene, -1.0), self._end(gene, 1.0)
 
     def _end(self, gene: int, sign: float) -> Array:
         """Return the point with the largest (sign 1) or smallest (-1) value of a gene in its interval."""
-        goal = self.least + ONE_GENE_95
-        inside = self._seen[self._values <= goal]
+        goal = self.chi2 + ONE_GENE_95
+        inside = self._seen[self._chi2 <= goal]
         begun = [self.best, *inside[np.argsort(-sign * inside[:, gene])][:1]]
         scale, ahead = np.sqrt(np.diag(self.covariance)), sign * np.eye(len(self.best))[gene]
         ends = list(begun)
@@ -182,14 +189,14 @@ class Likelihood:
                 bounds=[(0.0, 1.0 / one) for one in scale],
                 constraints={
                     "type": "ineq",
-                    "fun": lambda x: goal - float(self((x * scale)[None])[0]),
-                    "jac": lambda x: -self.gradient(x * scale) * scale,
+                    "fun": lambda x: goal - float(self._parts((x * scale)[None])[0][0]),
+                    "jac": lambda x: -self._gradients(x * scale)[0] * scale,
                 },
                 options={"maxiter": 100, "ftol": 1e-5},
             )  # fmt: skip
             at = found.x * scale
             at = np.where(at < _ROUNDING, 0.0, np.where(at > 1.0 - _ROUNDING, 1.0, at))
-            if float(self(at[None])[0]) <= goal + _GOAL_MET:
+            if float(self._parts(at[None])[0][0]) <= goal + _GOAL_MET:
                 ends.append(at)
         return max(ends, key=lambda at: float(ahead @ at))
 

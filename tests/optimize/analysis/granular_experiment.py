@@ -92,8 +92,8 @@ def crowded(seed, spread=40, close=170, starts=2, width=0.02):
     return truth, found, right_widths(truth, 4, curved=True)
 
 
-def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8)):
-    """(truth, intervals, exact widths) for a data set, from an archive of 300 designs.
+def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8), runs=300):
+    """(truth, intervals, exact widths) for a data set, from an archive of ``runs`` designs.
 
     tau : noise of the random starts in each quantity, in uncertainties.
     """
@@ -107,7 +107,7 @@ def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8
         off.append((quantities(points, number)[:, None] - data) / sigma + own)
         return (off[-1].mean(axis=1) ** 2).sum(axis=-1)
 
-    points = cloud(rng, misfits)
+    points = cloud(rng, misfits, runs)
     found = intervals(Evidence.of_quantities(points, np.concatenate(off), common))
     return truth, found, right_widths(truth, number)
 
