@@ -1,10 +1,10 @@
 """Calibration: the 95 % interval of each gene from measurements, and genes that cannot be distinguished.
 
 It needs a problem whose objective is the Misfit of measured quantities. The responses of the quantities to
-the genes, from the designs of the search, give the likelihood of the genes (optimize.analysis.likelihood): the
-estimate of each gene, its 95 % interval and the correlations. The interval is a likelihood interval: it is
-valid if the uncertainties of the measurements are right and their errors are normal and independent. It
-includes the error of the responses, which is large where few designs were run.
+the genes, from the designs of the search, give the likelihood of the genes (optimize.analysis.likelihood):
+the estimate of each gene, its 95 % interval and the correlations. The interval is valid if the uncertainties
+of the measurements are right and their errors are normal and independent. It includes the error of the
+responses, which is large where few designs were run.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
 
 from tisim.errors import Words, must
-from tisim.optimize.analysis.likelihood import ONE_GENE_95, Evidence, Likelihood
+from tisim.optimize.analysis.evidence import Evidence
+from tisim.optimize.analysis.likelihood import ONE_GENE_95, Likelihood
+from tisim.optimize.analysis.remarks import few_runs, remarks_on, undetermined
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.feasibility import excess
 from tisim.optimize.problem.gene_values import Value, brief
@@ -29,20 +30,8 @@ from tisim.optimize.problem.statistic import Misfit
 
 Array = NDArray[np.float64]
 
-UNTOLD = 1.0
-"""A direction is undetermined if chi^2 grows less than this along it within the ranges of the genes."""
 _ALMOST_ALL = 0.95
 """A gene is undetermined if its interval covers a larger part of its range than this."""
-_TOGETHER = 0.9
-"""Correlations of two estimates from this magnitude on are mentioned in the remarks."""
-_COARSE = 0.7
-"""Runs at the end of an interval are proposed if the error of a response there is larger than this, in
-uncertainties of the measurement."""
-_LITTLE = 0.05
-"""A gene with a smaller share in the undetermined directions than this is not listed with them."""
-_UNLIKELY = 0.01
-"""If a chi^2 this large or larger has a lower probability, a remark says that the measurements are not
-met."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +130,10 @@ def calibration(outcome: Outcome) -> Calibration:
     near = evidence.of(same, numbers)
     missing = near.missing if numbers else 0
     if missing or not numbers:
-        remarks = [f"Too few designs are near the least misfit: {missing} more are needed."] if missing else []
+        words = f"Too few designs are near the least misfit: {missing} more are needed."
         wanted = _wanted(problem, points[same], near.chi2, numbers, missing)
         return Calibration((), choices, np.empty((0, 0)), float(evidence.chi2.min()),
-                           measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
+                           measurements, 0, missing, wanted, (words,) if missing else ())  # fmt: skip
     likelihood = Likelihood(near)
     searched = [genome.searched[k] for k in numbers]
     ends = [likelihood.interval(k) for k in range(len(numbers))]
@@ -152,12 +141,10 @@ def calibration(outcome: Outcome) -> Calibration:
         _estimate(gene, *(float(at[k]) for at in (likelihood.best, *ends[k])))
         for k, gene in enumerate(searched)
     )
-    unknown, wide = _unknown(measured, likelihood, ends)
-    wanted = []
-    for end in wide:
-        at = best.copy()
-        at[numbers] = end
-        wanted.append(genome.decode(at))
+    known = [one.name for one in estimates if one.told]
+    few, wide = few_runs(likelihood, tuple(measured.quantities), [end for pair in ends for end in pair])
+    to_run = np.tile(best, (len(wide), 1))
+    to_run[:, numbers] = np.reshape(wide, (len(wide), len(numbers)))
     return Calibration(
         genes=estimates,
         choices=choices,
@@ -166,10 +153,10 @@ def calibration(outcome: Outcome) -> Calibration:
         measurements=measurements,
         designs=likelihood.designs,
         missing=0,
-        wanted=tuple(wanted),
+        wanted=tuple(genome.decode(point) for point in to_run),
         remarks=(
-            *_remarks(measurements, likelihood, searched, estimates),
-            *unknown,
+            *remarks_on(likelihood, [gene.name for gene in searched], known),
+            *few,
             *_violating(outcome, evidence),
         ),
     )
@@ -207,24 +194,6 @@ def _estimate(gene: Searched, best: float, low: float, high: float) -> GeneEstim
     return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, low, high)
 
 
-def _unknown(
-    measured: Misfit, likelihood: Likelihood, ends: Sequence[tuple[Array, Array]]
-) -> tuple[list[str], list[Array]]:
-    """Return a remark if intervals are wide because few designs were run at their ends, and these ends."""
-    points = [end for pair in ends for end in pair]
-    errors = np.array([likelihood.unknown(point) for point in points])
-    wide = np.any(errors > _COARSE, axis=1)
-    if not np.any(wide):
-        return [], []
-    worst = int(np.argmax(errors.max(axis=0)))
-    quantity = tuple(measured.quantities)[worst]
-    words = (
-        f"Few designs were run near the ends of the intervals, where {quantity} is known to "
-        f"{errors[:, worst].max():.2g} uncertainties of its measurement: runs there would narrow the intervals."
-    )
-    return [words], [point for point, is_wide in zip(points, wide, strict=True) if is_wide]
-
-
 def _choices(
     problem: Problem, points: Array, chi2: Array, others: Sequence[int]
 ) -> dict[str, tuple[Value, ...]]:
@@ -249,74 +218,14 @@ def _wanted(
     return tuple(problem.genome.decode(u) for u in drawn)
 
 
-def _remarks(
-    measurements: int,
-    likelihood: Likelihood,
-    genes: Sequence[Searched],
-    estimates: Sequence[GeneEstimate],
-) -> list[str]:
-    """Return remarks on genes that cannot be distinguished, and on reasons to doubt the intervals."""
-    remarks = []
-    growth, directions = likelihood.growth()
-    correlation = likelihood.correlation
-    free = growth < UNTOLD
-    if np.any(free):
-        remarks += _untold(directions[:, free], float(growth[free].max()), genes)
-    known = {one.name for one in estimates if one.told}
-    for i, one in enumerate(genes):
-        for j, other in enumerate(genes[:i]):
-            rho = correlation[i, j]
-            if abs(rho) > _TOGETHER and {one.name, other.name} <= known:
-                more = "less" if rho < 0 else "more"
-                remarks.append(
-                    f"{other.name} and {one.name} are hard to distinguish: more of one fits with {more} of "
-                    f"the other (correlation {rho:.2f})."
-                )
-    freedom = max(measurements - len(genes), 1)
-    if chi2_distribution.sf(likelihood.chi2, freedom) < _UNLIKELY:
-        remarks.append(
-            f"The model does not meet all measurements: the least chi^2 is {likelihood.chi2:.3g} of "
-            f"{measurements} quantities. The intervals are valid only if it can."
-        )
-    return remarks
-
-
 def _correlation(likelihood: Likelihood) -> Array:
     """Return the correlations of the estimates, NaN for a gene that is undetermined by itself.
 
     Such a gene fits equally well at any value, and its small correlations with others are due to chance.
     """
-    growth, directions = likelihood.growth()
-    alone = (directions[:, growth < UNTOLD] ** 2).sum(axis=1) > 1.0 - _LITTLE
-    correlation = likelihood.correlation
+    alone, correlation = undetermined(likelihood), likelihood.correlation
     correlation[alone, :] = correlation[:, alone] = math.nan
     return correlation
-
-
-def _untold(directions: Array, grown: float, genes: Sequence[Searched]) -> list[str]:
-    """Return sentences that name the genes, or combinations of genes, that are undetermined.
-
-    directions : shape (genes, directions), of the unit cube; chi^2 changes by ``grown`` or less along them.
-    """
-    parts = (directions**2).sum(axis=1)
-    change = f"chi^2 changes by {grown:.2g} or less"
-    alone = [gene.name for gene, part in zip(genes, parts, strict=True) if part > 1.0 - _LITTLE]
-    told = [f"The measurements do not determine {_listed(alone)}: {change} over the range."] if alone else []
-    mixed = [k for k, part in enumerate(parts) if _LITTLE <= part <= 1.0 - _LITTLE]
-    if len(mixed) < 2:
-        return told
-    names = _listed([genes[k].name for k in mixed])
-    if directions.shape[1] - len(alone) > 1:
-        return [*told, f"{names} cannot be distinguished: {change} along several combinations of them."]
-    one = directions[mixed, int(np.argmax((directions[mixed] ** 2).sum(axis=0)))]
-    up = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] > 0]
-    down = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] < 0]
-    goes = f"for more {_listed(up)} with less {_listed(down)}" if down else "if all increase together"
-    return [*told, f"{names} cannot be distinguished: {change} {goes}."]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def columns(result: Calibration) -> dict[str, list[Any]]:

@@ -7,27 +7,25 @@ due to random starts common to all designs,
     -2 log L(u) = chi^2(u) + sum over the quantities of log(1 + s + v(u))
        chi^2(u) = sum over the quantities of (q(u) - m)^2 / (1 + s + v(u))
 
-The estimate is the most likely design. The designs with chi^2 less than 3.84 above its value there form the
-95 % interval of one gene. With v = 0 this is the likelihood-ratio interval. v is large where no designs were
-run. The likelihood is small there, since few of the possible values of q are near m; but such designs are not
-excluded by any run, and chi^2 keeps them in the interval.
+The estimate is the maximum of the likelihood near the designs that were run. The designs with chi^2 less
+than 3.84 above its value there form the 95 % interval of one gene. With v = 0 this is the likelihood-ratio
+interval. v is large where no designs were run. The likelihood is small there, since few of the possible
+values of q are near m; but such designs are not excluded by any run, and chi^2 keeps them in the interval.
+Only regions that contain designs that were run, or are connected to them, are searched: with many genes,
+most corners of the ranges are never visited.
 
-Source: M. C. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425-464; chi^2 as implausibility: I. Vernon,
-M. Goldstein and R. G. Bower, Bayesian Anal. 5 (2010) 619-669, section 3; interval for v = 0: S. S. Wilks, Ann.
-Math. Stat. 9 (1938) 60-62.
+Source: M. C. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425-464; chi^2 as implausibility: I.
+Vernon, M. Goldstein and R. G. Bower, Bayesian Anal. 5 (2010) 619-669, section 3; interval for v = 0: S. S.
+Wilks, Ann. Math. Stat. 9 (1938) 60-62.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
+from tisim.optimize.analysis.evidence import Evidence
 from tisim.optimize.analysis.response import Response
 from tisim.optimize.surrogate.selection import MOST_LEARNED, representative
 
@@ -35,80 +33,12 @@ Array = NDArray[np.float64]
 
 ONE_GENE_95 = 3.841
 """The 0.95 quantile of chi^2 with one degree of freedom."""
-NEAR_CHI2 = 12.0
-"""Designs with chi^2 less than this above the least are near: 3.5 standard deviations along one gene."""
-FAR_CHI2 = 60.0
-"""Upper limit of that distance, which is enlarged if few designs are near."""
-_PER_COEFFICIENT = 2.0
-"""Number of near designs wanted for each coefficient of a quadratic form; the limit is enlarged beyond
-NEAR_CHI2 to reach it."""
-_SAMPLES, _BEGUN = 2048, 4
-"""Number of points, a power of two, at which the likelihood is computed before it is maximised; number of
-these from which the maximum is searched."""
-
+_BEGUN = 4
+"""Number of designs, the most likely ones, from which the maximum is searched."""
 _ROUNDING = 1e-5
 """An end of an interval this near to an end of the range is at it, in parts of the range."""
 _GOAL_MET = 0.01
 """Deviation of chi^2 from 3.84 above the most likely point that is accepted at an end of an interval."""
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Designs, and the distances of their quantities from the measurements.
-
-    points : shape (designs, genes), of the unit cube.
-    off : means over the starts of each design, in uncertainties, shape (designs, quantities).
-    variance : of each mean due to the random starts, in squared uncertainties, the same shape; 0 if runs have
-        no noise.
-    shift : with starts common to all designs, the variance that they add to each measured quantity, shape
-        (quantities,); else 0.
-    chi2 : the sum of the squares of ``off``, without the part that is due to the random starts.
-    """
-
-    points: Array
-    off: Array
-    variance: Array
-    shift: Array
-    chi2: Array
-
-    @classmethod
-    def of_quantities(cls, points: Array, off: Sequence[Array], common: bool) -> Evidence:
-        """Return the evidence of all runs.
-
-        off : for each design the distance of its runs from the measurements, in uncertainties, shape (starts,
-            quantities).
-        common : whether all designs have the same starts.
-
-        The squared distance of a mean over n starts is too large by its variance, s^2 / n, which is
-        subtracted. Common starts move the quantities of all designs alike, by a random amount; differences
-        between designs are then free of noise.
-        """
-        starts = np.array([len(one) for one in off], dtype=float)[:, None]
-        means = np.array([one.mean(axis=0) for one in off])
-        squares = np.array([((one - one.mean(axis=0)) ** 2).sum(axis=0) for one in off])
-        freedom = np.maximum(starts - 1.0, 0.0)
-        pooled = squares.sum(axis=0) / max(freedom.sum(), 1.0)
-        own = np.where(starts > 1, squares / np.maximum(freedom, 1.0), pooled) / starts
-        chi2 = (means**2 - own).sum(axis=1)
-        if common:
-            return cls(points, means, np.zeros_like(means), pooled / np.median(starts), chi2)
-        return cls(points, means, pooled / starts, np.zeros_like(pooled), chi2)
-
-    def of(self, chosen: NDArray[np.bool_], genes: Sequence[int]) -> Evidence:
-        """Return the evidence of chosen designs and genes."""
-        return Evidence(
-            self.points[chosen][:, genes], self.off[chosen], self.variance[chosen], self.shift, self.chi2[chosen]
-        )
-
-    @property
-    def missing(self) -> int:
-        """The number of further designs near the least misfit that are needed for a likelihood; 0 if it has
-        enough."""
-        above = np.sort(self.chi2 - self.chi2.min())
-        count = coefficients(self.points.shape[1])
-        enough = math.ceil(_PER_COEFFICIENT * count)
-        within = min(max(NEAR_CHI2, float(above[min(enough, len(above)) - 1]) * (1 + 1e-12)), FAR_CHI2)
-        return 0 if np.sum(above < within) >= count + 2 else enough - int(np.sum(above < NEAR_CHI2))
 
 
 class Likelihood:
@@ -126,11 +56,9 @@ class Likelihood:
         points, self.designs = evidence.points[chosen], len(chosen)
         parts = zip(evidence.off[chosen].T, evidence.variance[chosen].T, strict=True)
         self.responses = [Response(points, off, variance) for off, variance in parts]
-        genes = points.shape[1]
-        drawn = qmc.Sobol(genes, seed=1).random(_SAMPLES)
-        self._seen = np.vstack([drawn, evidence.points[np.argsort(evidence.chi2)[:_SAMPLES]]])
-        self._chi2, logarithms = self._parts(self._seen)
-        begun = self._seen[np.argsort(self._chi2 + logarithms)[:_BEGUN]]
+        self._run = points
+        self._chi2, logarithms = self._parts(points)
+        begun = points[np.argsort(self._chi2 + logarithms)[:_BEGUN]]
         found = [self._minimised(point) for point in begun]
         _, self.best = min(found, key=lambda one: one[0])
         self.chi2 = float(self._parts(self.best[None])[0][0])
@@ -163,7 +91,8 @@ class Likelihood:
 
     def _minimised(self, begin: Array) -> tuple[float, Array]:
         found = minimize(
-            lambda u: float(self(u[None])[0]), begin, jac=lambda u: sum(self._gradients(u)), method="L-BFGS-B",
+            lambda u: float(self(u[None])[0]), begin, method="L-BFGS-B",
+            jac=lambda u: np.sum(self._gradients(u), axis=0),
             bounds=[(0.0, 1.0)] * len(begin), options={"maxiter": 200, "ftol": 1e-12, "gtol": 1e-8},
         )  # fmt: skip
         return float(found.fun), np.clip(found.x, 0.0, 1.0)
@@ -172,14 +101,14 @@ class Likelihood:
         """Return the points with the smallest and the largest value of a gene in its 95 % interval.
 
         They have chi^2 at most 3.84 above the most likely point, with the other genes free within their
-        ranges.
+        ranges. They are searched from the most likely point, and from the designs in the interval.
         """
         return self._end(gene, -1.0), self._end(gene, 1.0)
 
     def _end(self, gene: int, sign: float) -> Array:
         """Return the point with the largest (sign 1) or smallest (-1) value of a gene in its interval."""
         goal = self.chi2 + ONE_GENE_95
-        inside = self._seen[self._chi2 <= goal]
+        inside = self._run[self._chi2 <= goal]
         begun = [self.best, *inside[np.argsort(-sign * inside[:, gene])][:1]]
         scale, ahead = np.sqrt(np.diag(self.covariance)), sign * np.eye(len(self.best))[gene]
         ends = list(begun)
@@ -223,7 +152,7 @@ class Likelihood:
         Along an undetermined direction rounding errors would correlate all genes. The variance 1/12 of a
         range, added as prior information, limits such a direction.
         """
-        return np.linalg.inv(self.information + 12.0 * np.eye(len(self.best)))
+        return np.asarray(np.linalg.inv(self.information + 12.0 * np.eye(len(self.best))))
 
     @property
     def correlation(self) -> Array:
@@ -238,8 +167,3 @@ class Likelihood:
         values, vectors = np.linalg.eigh(self.information)
         length = 0.5 / np.max(np.abs(vectors), axis=0)
         return np.maximum(values, 0.0) * length**2, vectors
-
-
-def coefficients(genes: int) -> int:
-    """Return the number of coefficients of a quadratic form of this number of genes."""
-    return (genes + 1) * (genes + 2) // 2

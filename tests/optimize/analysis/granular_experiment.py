@@ -13,7 +13,8 @@ import numpy as np
 
 from tisim import optimize
 from tisim.optimize import Gene, Misfit, Objective, Problem
-from tisim.optimize.analysis.likelihood import Evidence, Likelihood
+from tisim.optimize.analysis.evidence import Evidence
+from tisim.optimize.analysis.likelihood import Likelihood
 
 GENES = (
     Gene("friction", "", 0.05, 1.0),

@@ -17,7 +17,8 @@ from tests.optimize.analysis.granular_experiment import (
 )
 from tisim import InputError, optimize
 from tisim.optimize import Choice, Gene, Problem
-from tisim.optimize.analysis.likelihood import Evidence, Likelihood, coefficients
+from tisim.optimize.analysis.evidence import Evidence, coefficients
+from tisim.optimize.analysis.likelihood import Likelihood
 from tisim.optimize.analysis.response import Response
 from tisim.optimize.report.analysis import Analysis
 
@@ -203,7 +204,8 @@ def test_runs_where_few_were_run_are_proposed_and_narrow_the_interval():
         }
 
     objective = measured_objective({"sum": (1.0, 0.1), "own": (0.5, 0.05)})
-    problem = Problem.of_function(noisy, [Gene("a", "", 0, 1), Gene("b", "", 0, 1)], (objective,), code="made")
+    genes = [Gene("a", "", 0, 1), Gene("b", "", 0, 1)]
+    problem = Problem.of_function(noisy, genes, (objective,), code="made")
     found = []
     for _ in range(2):
         outcome = optimize.run(
@@ -214,7 +216,10 @@ def test_runs_where_few_were_run_are_proposed_and_narrow_the_interval():
         designs += [_moved(design, rng) for design in 3 * found[-1].wanted]
     first, second = found
     (remark,) = first.remarks
-    assert "Few designs were run near the ends of the intervals, where sum is known to" in remark
+    assert (
+        "Few designs were run near the ends of the intervals: the error of the simulated sum is up to"
+        in remark
+    )
     assert first.genes[0].part > 0.7
     assert (second.remarks, second.wanted) == ((), ())
     assert second.genes[0].part == pytest.approx(2 * 1.96 * np.sqrt(0.1**2 + 0.05**2), rel=0.2)
