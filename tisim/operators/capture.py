@@ -105,10 +105,9 @@ class Capture(TouchingMagnets):
             if touched >= 0:
                 by, outward = touched, away
                 s.position[w, i] = r + (radius - distance) * outward
-        if ti.static(self.releases):
-            if not free and s.captured_by[w, i] >= 0 and s.adheres[w, i] == 0 and s.captured_at[w, i] < t:
-                by = s.captured_by[w, i]
-                outward = self.outward(w, by, r)
+        if self.may_come_off(s, w, i, t):
+            by = s.captured_by[w, i]
+            outward = self.outward(w, by, r)
         if by >= 0:
             # One call, as the laws of a scene may take long to compile.
             holds = self.holds(s, w, i, t, outward)
@@ -119,6 +118,14 @@ class Capture(TouchingMagnets):
                 s.velocity[w, i] -= inward * outward
             elif not holds:
                 self.let_go(s, w, i, t)
+
+    @ti.func
+    def may_come_off(self, s, w, i, t):
+        """Return whether particle i was captured in an earlier step and does not adhere."""
+        may = False
+        if ti.static(self.releases):
+            may = s.captured_by[w, i] >= 0 and s.adheres[w, i] == 0 and s.captured_at[w, i] < t
+        return may
 
     @ti.func
     def let_go(self, s, w, i, t):
