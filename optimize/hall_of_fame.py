@@ -82,7 +82,7 @@ def reported(individual: Individual) -> tuple[float, ...]:
 
 
 def not_dominated(front: Sequence[Individual]) -> list[Individual]:
-    """Return the designs of a front that no other dominates, sorted by the first cost, all by reported costs."""
+    """Return the designs of a front that no other dominates, sorted by the first cost; costs as reported."""
     costs = np.array([reported(individual) for individual in front])
     no_better = np.all(costs[:, None] >= costs[None], axis=2)
     worse = np.any(costs[:, None] > costs[None], axis=2)
