@@ -202,10 +202,10 @@ def test_a_resumed_search_is_the_same(path, tmp_path):
         return zdt1(design, seed, noise=0.02)
 
     whole = run(tmp_path / "whole.h5", noisy, **settings)
-    part = run(path, evaluator=FakeEvaluator(noisy, interrupt_after=300), **settings)
+    part = run(path, evaluator=FakeEvaluator(noisy, interrupt_after=200), **settings)
     assert part.interrupted
     again = run(path, noisy, **settings)
-    assert again.evaluations == whole.evaluations - 300
+    assert again.evaluations == whole.evaluations - 200
     assert [(list(one), repr(one.estimates), repr(one.confirmed)) for one in again.hall] == [
         (list(one), repr(one.estimates), repr(one.confirmed)) for one in whole.hall
     ]
