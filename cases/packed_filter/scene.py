@@ -36,6 +36,7 @@ from tisim.packing import GrainClass, LognormalSizes, MagneticCore
 from tisim.packing.grains import draw
 from tisim.packing.magnetic_core import core_normals
 from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow, UniformFlow, magnetise
+from tisim.sources.magnetic.cell_sum import Corners
 from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.sources.switched import NO_END
 from tisim.steppers import Brownian, DriftLimit
@@ -191,6 +192,7 @@ class PackedFilter:
                 MagneticCylinders(
                     cylinders=magnets,
                     sum_digits=self.digits,
+                    sum_box=self.stretch(box),
                     end=self.field_end,
                 ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
@@ -207,9 +209,8 @@ class PackedFilter:
         """Return the flow, and the faces before and behind a box at which colloids enter and leave."""
         if self.mode == "static":
             return ()
-        before = APPROACH * self.matrix.length
-        (left, front, bottom), (right, back, top) = box.low, box.high
-        first, entry, last = bottom - before - self.matrix.diameter, bottom - before, top + before
+        (left, front, first), (right, back, last) = self.stretch(box)
+        entry = first + self.matrix.diameter
         flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed))
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
@@ -229,6 +230,15 @@ class PackedFilter:
             ),
             Outlet(planes=(Plane(point=(0.0, 0.0, last), normal=(0.0, 0.0, -1.0)),)),
         )
+
+    def stretch(self, box: Box) -> Corners:
+        """Return the corners (m) of the box in which colloids are: the box of the matrix, from the beginning
+        of the inlet to the outlet if there is a flow."""
+        (left, front, bottom), (right, back, top) = box.low, box.high
+        if self.mode == "dynamic":
+            before = APPROACH * self.matrix.length
+            bottom, top = bottom - before - self.matrix.diameter, top + before
+        return (left, front, bottom), (right, back, top)
 
     def release(self) -> Release | None:
         """Return the conditions under which captured colloids are released."""
