@@ -94,13 +94,13 @@ class PackedFilter:
     """A filter and the suspension in it.
 
     matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
-    magnetise each other. digits : of the sum of their fields by cells; None to add the fibres one by one, from
-    a table, which is faster for few colloids. speed : superficial velocity of the water, the volume flow over
-    the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform" with the mean
-    velocity in the pores. resolution : cells of the resolved flow over D, unless ``cells``
-    along x, y and z are given. feed : time until which colloids enter, s. field_end : time at which the field
-    is switched off, s. adhering : fraction of captured colloids that are never released; None for captures
-    that last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
+    magnetise each other. digits : of the sum of their fields by cells; None to add the fibres one by one,
+    from a table, which is faster for few colloids. speed : superficial velocity of the water, the volume flow
+    over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform" with the
+    mean velocity in the pores. resolution : cells of the resolved flow over D, unless ``cells`` along x, y
+    and z are given. feed : time until which colloids enter, s. field_end : time at which the field is
+    switched off, s. adhering : fraction of captured colloids that are never released; None for captures that
+    last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
     duration : of the run, s.
     """
 
