@@ -1,0 +1,1 @@
+from .run_report import run_report as run_report
