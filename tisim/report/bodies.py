@@ -47,15 +47,13 @@ class Mesh:
     @staticmethod
     def joined(parts: Sequence[Mesh]) -> Mesh:
         """Return several meshes as one."""
-        begin = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        kinds = (("triangles", 3), ("lines", 2))
-        triangles, lines = (
-            np.concatenate(
-                [np.empty((0, size), int), *(getattr(part, name) + k for part, k in zip(parts, begin, strict=False))]
-            )
-            for name, size in kinds
+        begin = np.cumsum([0, *(len(part.vertices) for part in parts)])[:-1]
+        shifted = list(zip(parts, begin, strict=True))
+        return Mesh(
+            np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
+            np.concatenate([np.empty((0, 3), int), *(part.triangles + k for part, k in shifted)]),
+            np.concatenate([np.empty((0, 2), int), *(part.lines + k for part, k in shifted)]),
         )
-        return Mesh(np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]), triangles, lines)
 
 
 @dataclass
@@ -207,7 +205,9 @@ def _sharp_edges(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
     owner = np.tile(np.arange(len(triangles)), 3)
     order = np.lexsort(edges.T[::-1])
     unique, first, number = np.unique(edges[order], axis=0, return_index=True, return_counts=True)
@@ -246,7 +246,9 @@ def _planes(planes: Sequence[Plane], low: np.ndarray, high: np.ndarray) -> Itera
     faces = [(np.array(one.point), np.array(one.unit_vector())) for one in planes]
     for k, (point, normal) in enumerate(faces):
         foot, (a, b) = middle - (middle - point) @ normal * normal, across(normal)
-        polygon = np.array([foot + 2 * size * (x * a + y * b) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+        polygon = np.array(
+            [foot + 2 * size * (x * a + y * b) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        )
         for place, inwards in (*sides, *(face for m, face in enumerate(faces) if m != k)):
             polygon = _cut(polygon, (polygon - place) @ inwards + 1e-9 * size)
         if len(polygon) > 2:
@@ -263,7 +265,9 @@ def _cut(polygon: np.ndarray, side: np.ndarray) -> np.ndarray:
     kept = []
     for k in range(len(polygon)):
         if (side[k - 1] > 0) != (side[k] > 0):
-            kept.append(polygon[k - 1] + side[k - 1] / (side[k - 1] - side[k]) * (polygon[k] - polygon[k - 1]))
+            kept.append(
+                polygon[k - 1] + side[k - 1] / (side[k - 1] - side[k]) * (polygon[k] - polygon[k - 1])
+            )
         if side[k] > 0:
             kept.append(polygon[k])
     return np.array(kept).reshape(-1, 3)

@@ -6,8 +6,8 @@ Values are rounded to whole numbers q of 8, 16 or 32 bits,
 
 and q is stored as its first or second difference in time, whichever is smaller, modulo 2^bits. The sign of a
 difference is moved to its lowest bit, so that small differences have high bytes of 0. The bytes are stored in
-planes, all lowest bytes first, one particle after another, and compressed by zlib, which browsers inflate themselves
-(``DecompressionStream``). static/trajectory.js is the inverse in a browser.
+planes, all lowest bytes first, one particle after another, and compressed by zlib, which browsers inflate
+themselves (``DecompressionStream``). static/trajectory.js is the inverse in a browser.
 """
 
 from __future__ import annotations

@@ -177,7 +177,8 @@ def _part(frame: Frame, part: int) -> Arrays:
 def _survey(frames: FrameSequence, chosen: Sequence[int], part: int) -> _Survey:
     """Read the chosen frames for the ranges of quantities, and for the rows of particles."""
     rows, held, free = 0, dict[int, int](), list[int]()
-    row_of, counts, radii, ranges = [], [], [], dict[str, _Range]()
+    row_of, counts, radii = list[np.ndarray](), list[int](), list[np.ndarray]()
+    ranges = dict[str, _Range]()
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     corners = np.full(3, np.inf), np.full(3, -np.inf)
     names: set[str] | None = None
@@ -202,8 +203,9 @@ def _survey(frames: FrameSequence, chosen: Sequence[int], part: int) -> _Survey:
             radii.append(radius[:: max(1, len(radius) // 1000)])
             low = np.minimum(low, (position - radius[:, None]).min(axis=0))
             high = np.maximum(high, (position + radius[:, None]).max(axis=0))
-            corners = np.minimum(corners[0], position.min(axis=0)), np.maximum(
-                corners[1], position.max(axis=0)
+            corners = (
+                np.minimum(corners[0], position.min(axis=0)),
+                np.maximum(corners[1], position.max(axis=0)),
             )
             for name, values in here.items():
                 _extend(ranges, name, values, max(1, len(values) * len(chosen) // SAMPLED_VALUES))
@@ -321,7 +323,7 @@ def _scale(found: _Range, bits: int) -> Scale:
 
 def _spreads(found: _Range) -> bool:
     """Return whether a logarithmic scale suits a quantity."""
-    if not (0 < found.low and found.high > WIDE_RANGE * found.low):
+    if not (found.low > 0 and found.high > WIDE_RANGE * found.low):
         return False
     return float(np.median(np.concatenate(found.sample))) < 0.1 * found.high
 

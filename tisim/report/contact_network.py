@@ -22,6 +22,7 @@ from tisim.scene.scene import Scene
 
 MOST_CONTACTS = 4_000_000
 """Largest number of contacts, summed over the frames, for which a network is stored."""
+USUAL_OVERLAP = 99.0
 OVERLAPS = 255
 """Number of steps of the scale of overlaps."""
 
@@ -32,12 +33,14 @@ class ContactNetwork:
 
     pairs : rows of both particles and the first and the last frame, shape (intervals, 4), sorted.
     overlaps : for one interval after another, the overlap in each of its frames, rounded.
-    largest : overlap (m) that the last step of their scale stands for.
+    largest : overlap (m) that the last step of their scale stands for. usual : a large overlap (m) that is
+        not an outlier, the percentile USUAL_OVERLAP.
     """
 
     pairs: np.ndarray
     overlaps: np.ndarray
     largest: float
+    usual: float
 
     def data(self) -> bytes:
         """Return the compressed numbers: the columns of ``pairs`` as differences (the first from the interval
@@ -53,6 +56,7 @@ class ContactNetwork:
         """Return all but the data as plain data."""
         return {
             "intervals": len(self.pairs), "overlaps": len(self.overlaps), "largest": self.largest,
+            "usual": self.usual,
             "steps": OVERLAPS,
         }  # fmt: skip
 
@@ -102,4 +106,5 @@ def _network(
     low, high = np.divmod(key[first], particles)
     largest = float(overlap.max())
     steps = np.rint(overlap / (largest or 1.0) * OVERLAPS).astype(np.uint8)
-    return ContactNetwork(np.stack([low, high, when[first], when[last]], axis=1), steps, largest)
+    pairs = np.stack([low, high, when[first], when[last]], axis=1)
+    return ContactNetwork(pairs, steps, largest, float(np.percentile(overlap, USUAL_OVERLAP)))

@@ -98,9 +98,7 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], name: str, numbers: Sequence[int] = ()
-) -> str:
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], name: str, numbers: Sequence[int] = ()) -> str:
     """Return a table of text cells as HTML.
 
     name : of the file as which a reader saves it. numbers : indices of columns of numbers.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
+from typing import cast
 
 import numpy as np
-from matplotlib import colormaps
 
 from tisim.describe.explained_parts import Part
 from tisim.engine.result import Result
@@ -16,17 +18,17 @@ from tisim.errors import InputError, Words, must
 from tisim.files import regular_file
 from tisim.files.atomic import replace_file
 from tisim.io.reader import Frames, frames
-from tisim.plotting import facets, time_series
-from tisim.plotting.cloud import gravity
+from tisim.plotting import time_series
 from tisim.reading import read
-from tisim.report import bodies, tables
+from tisim.report import tables
 from tisim.report.columns import Column
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence, compress
 from tisim.report.contact_network import ContactNetwork, contact_network, has_contacts
+from tisim.report.kept_frames import KeptFrames
 from tisim.report.page import Page, Section, picture, table
+from tisim.report.scenery import colour_maps, scenery
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.shapes.particle_shape import ParticleShape
 
 LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
@@ -34,13 +36,8 @@ REST = 0.25e6
 """Bytes that are reserved for everything but the recording and pictures, in characters of the page."""
 LONGEST_TOML = 200_000
 """Number of characters from which on a scene is not shown as text."""
-MAPS = ("viridis", "cividis", "inferno", "coolwarm")
-"""Colour maps; the first is the default. All but the last are perceptually uniform."""
-MAP_COLOURS = 48
-"""Number of colours from which the browser interpolates a map."""
-MOST_SHOWN = 97.0
-"""Percentile of the particles of a frame, along each axis and in either direction, that the view shows at
-first; the others may be far away."""
+CHECKS = ("case", "check", "measured", "half_interval", "expected", "allowed", "verdict")
+"""Columns of the file of checks that are shown."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class ReportOptions:
     fields : quantities of the particles for colours; None for all.
     contacts : whether to store the contacts of grains.
     pictures : further pictures as PNG, by title.
-    checks : rows of text of a table of checks: name, measured, expected, deviation, bound, verdict.
+    checks : rows of text of a table of checks, from ``read_checks``.
     """
 
     limit: float = LIMIT
@@ -62,6 +59,19 @@ class ReportOptions:
 
     def __post_init__(self) -> None:
         must(0.5 <= self.limit < np.inf, "limit", "at least 0.5 MB, and finite", self.limit)
+
+
+def read_checks(path: Path) -> list[list[str]]:
+    """Return the rows of checks in a CSV file that ``tisim check --out`` has written.
+
+    Raise InputError if it is another file.
+    """
+    rule = "a table of checks, written by tisim check --out"
+    content = regular_file.content(path)
+    must(content is not None, "file of checks", rule, str(path))
+    rows = list(csv.DictReader(io.StringIO((content or b"").decode(errors="replace"))))
+    must(bool(rows) and set(CHECKS) <= rows[0].keys(), "file of checks", rule, str(path))
+    return [[row[name] or "" for name in CHECKS] for row in rows]
 
 
 def run_report(
@@ -76,19 +86,20 @@ def run_report(
     """
     chosen, path = options or ReportOptions(), Path(to)
     with frames(file, world) as sequence:
-        page = run_page(sequence, chosen, _result(Path(file), sequence))
+        page = run_page(KeptFrames(sequence), chosen, _result(Path(file), sequence.scene))
     replace_file(path, page.html().encode())
     return path
 
 
-def run_page(sequence: Frames, options: ReportOptions, result: Result | None) -> Page:
+def run_page(sequence: KeptFrames, options: ReportOptions, result: Result | None) -> Page:
     """Return the page of a run.
 
     result : of the same run; None if it has not ended.
     """
     must(len(sequence) > 0, "file", "one with a frame", Words("one with none yet"))
     scene, count = sequence.scene, len(sequence)
-    series = time_series.history(sequence)
+    # The function asks for a scene, times and frames alone.
+    series = time_series.history(cast(Frames, sequence))
     times, panels = tables.time_series(series, scene, sequence.measures)
     trajectory, network, notices = _recording(sequence, options)
     state, verdict, sentences = _status(sequence, result)
@@ -99,9 +110,9 @@ def run_page(sequence: Frames, options: ReportOptions, result: Result | None) ->
         lengths, data = [*lengths, len(network.data())], data + network.data()
     facts = {
         "name": scene.name, "trajectory": trajectory.facts(), "lengths": lengths,
-        "network": network.facts() if network else None, "scene": _scenery(sequence, trajectory),
+        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
         "series": {"times": tables.digits(times), "curves": panels},
-        "maps": _maps(), "materials": list(scene.materials),
+        "maps": colour_maps(), "materials": list(scene.materials),
     }  # fmt: skip
     ends = len(first["mass"]), len(last["mass"])
     shown = f"{len(trajectory.times)} of {count}" if len(trajectory.times) < count else f"{count}"
@@ -119,7 +130,7 @@ def run_page(sequence: Frames, options: ReportOptions, result: Result | None) ->
     )
 
 
-def _result(file: Path, sequence: Frames) -> Result | None:
+def _result(file: Path, scene: Scene) -> Result | None:
     """Return the result of the run, if it has ended."""
     path = file if file.name == "result.h5" else file.with_name("result.h5")
     if not regular_file.exists(path):
@@ -128,11 +139,11 @@ def _result(file: Path, sequence: Frames) -> Result | None:
         result = read(path)
     except InputError:
         return None
-    same = isinstance(result, Result) and result.scene.digest() == sequence.scene.digest()
+    same = isinstance(result, Result) and result.scene.digest() == scene.digest()
     return result if same else None
 
 
-def _status(sequence: Frames, result: Result | None) -> tuple[str, str, list[str]]:
+def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list[str]]:
     """Return the state, a word for it, and sentences about it."""
     if result is None:
         reached = sequence.missing
@@ -142,7 +153,7 @@ def _status(sequence: Frames, result: Result | None) -> tuple[str, str, list[str
 
 
 def _recording(
-    sequence: Frames, options: ReportOptions
+    sequence: FrameSequence, options: ReportOptions
 ) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
     """Return the frames that the limit allows, with their contacts, and sentences about those left out."""
     room = options.limit * 1e6 - REST - sum(4 / 3 * len(png) for png in options.pictures.values())
@@ -177,79 +188,6 @@ def _recording(
     return trajectory, network, notices
 
 
-def _scenery(sequence: Frames, trajectory: CompressedTrajectory) -> dict[str, object]:
-    """Return everything that is drawn beside the particles, as plain data."""
-    scene, domain = sequence.scene, sequence.scene.domain
-    low, high = trajectory.low, trajectory.high
-    box_low, box_high = domain.bounds()
-    box = None
-    focus = _focus(sequence, trajectory)
-    if box_low is not None and box_high is not None:
-        shown = trajectory.times if domain.shears() else trajectory.times[:1]
-        edges = [domain.edges(float(time)).tolist() for time in shown]
-        box = {"origin": box_low.tolist(), "edges": edges, "periodic": list(domain.joined())}
-        low, high = np.minimum(low, box_low), np.maximum(high, box_high)
-        focus = np.minimum(focus[0], box_low), np.maximum(focus[1], box_high)
-    travel = {
-        name.removesuffix("_travel"): values[trajectory.indices]
-        for name, values in sequence.measures.items()
-        if name.endswith("_travel")
-    }
-    walls = bodies.bodies(scene, trajectory.times, travel, *focus)
-    magnets = bodies.magnets(scene)
-    return {
-        "box": box, "low": low.tolist(), "high": high.tolist(),
-        "focus": {"low": focus[0].tolist(), "high": focus[1].tolist()},
-        "bodies": [body.facts() for body in walls], "magnets": [magnet.facts() for magnet in magnets],
-        "shapes": [_shape(shape) for shape in facets.shapes_of(scene)], "gravity": gravity(scene).tolist(),
-        "medianRadius": _median_radius(sequence),
-    }  # fmt: skip
-
-
-def _focus(sequence: FrameSequence, trajectory: CompressedTrajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (m) of a box around most particles at the first, the middle and the last frame."""
-    corners = []
-    for k in trajectory.indices[[0, len(trajectory.indices) // 2, -1]].tolist():
-        arrays = sequence[k].arrays
-        if len(arrays["radius"]):
-            position, radius = arrays["position"].astype(float), arrays["radius"].astype(float)[:, None]
-            few = len(radius) < 100
-            ends = (0.0, 100.0) if few else (100 - MOST_SHOWN, MOST_SHOWN)
-            low, high = (np.percentile(position, end, axis=0) for end in ends)
-            # As far beyond these percentiles as a uniform cloud reaches.
-            beyond = 0.0 if few else (100 - MOST_SHOWN) / (2 * MOST_SHOWN - 100)
-            room = beyond * (high - low) + float(np.median(radius))
-            corners += [low - room, high + room]
-    if not corners:
-        return trajectory.low, trajectory.high
-    return np.min(corners, axis=0), np.max(corners, axis=0)
-
-
-def _median_radius(sequence: FrameSequence) -> float:
-    """Return the median radius (m) in the last frame with particles."""
-    for k in (len(sequence) - 1, 0):
-        radius = sequence[k].arrays["radius"]
-        if len(radius):
-            return float(np.median(radius))
-    return 1.0
-
-
-def _shape(shape: ParticleShape) -> dict[str, object]:
-    """Return a shape of particles as plain data; one that is neither a rod nor a superquadric is drawn as the
-    ellipsoid of its extents."""
-    radius = shape.bounding_radius()
-    if (rod := shape.rod()) is not None:
-        return {"family": 1, "axes": [rod[1], 0.0, rod[0]], "exponents": [2.0] * 3, "radius": radius}
-    axes, exponents = shape.superquadric() or (tuple(shape.half_extents().tolist()), (2.0, 2.0, 2.0))
-    return {"family": 2, "axes": list(axes), "exponents": list(exponents), "radius": radius}
-
-
-def _maps() -> dict[str, list[list[int]]]:
-    """Return the colour maps, as red, green and blue from 0 to 255."""
-    places = np.linspace(0, 1, MAP_COLOURS)
-    return {name: np.rint(255 * colormaps[name](places)[:, :3]).astype(int).tolist() for name in MAPS}
-
-
 def _sections(
     scene: Scene, result: Result | None, states: tuple[Arrays, Arrays], options: ReportOptions
 ) -> list[Section]:
@@ -273,10 +211,12 @@ def _sections(
             "counts",
             (1,),
         )
-    sections = [Section("happened", "What happened", happened), Section("asked", "What was asked", _asked(scene))]
+    sections = [
+        Section("happened", "What happened", happened),
+        Section("asked", "What was asked", _asked(scene)),
+    ]
     if options.checks:
-        head = ("check", "measured", "expected", "deviation", "bound", "verdict")
-        checks = table(head, options.checks, "checks", (1, 2, 3, 4))
+        checks = table(CHECKS, options.checks, "checks", (2, 3, 4, 5))
         sections.append(Section("checks", "Checks of the case", checks))
     if options.pictures:
         shown = "\n".join(picture(title, png) for title, png in options.pictures.items())
@@ -359,8 +299,7 @@ def _versions(result: Result | None) -> str:
     if result is None:
         return ""
     settings = result.settings
-    told = [f"{name} {settings[name]}" for name in ("device", "precision", "arithmetic", "threads") if name in settings]
+    names = ("device", "precision", "arithmetic", "threads")
+    told = [f"{name} {settings[name]}" for name in names if name in settings]
     edited = f" Edited during the run: {settings['edited']}." if "edited" in settings else ""
     return f"{', '.join(told)}; wall time {result.wall_s:.3g} s.{edited}"
-
-

@@ -13,7 +13,7 @@ function tables() {
       const rows = [...table.rows].map((row) => [...row.cells].map((cell) => cell.textContent.trim()));
       download(`${table.dataset.csv}.csv`, csv(rows), "text/csv");
     };
-    table.before(element("div", { class: "buttons after" }, element("button", { type: "button", onclick: save, "aria-label": `Save ${table.dataset.csv} as CSV` }, "CSV")));
+    table.parentNode.before(element("div", { class: "buttons after" }, element("button", { type: "button", onclick: save, "aria-label": `Save ${table.dataset.csv} as CSV` }, "CSV")));
   }
   const toml = document.getElementById("toml");
   if (!toml) return;

@@ -66,6 +66,12 @@ const CLASSES = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68],
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const FRAMES_A_SECOND = 20;
 
+const PLAY = "M4 2.5v11L14 8z", PAUSE = "M4 3h3v10H4z M9.5 3h3v10h-3z";
+
+function icon(path) {
+  return element("svg", { class: "icon", viewBox: "0 0 16 16", "aria-hidden": "true" }, element("path", { d: path }));
+}
+
 class Player {
   /** place : element to fill. facts : name, colour maps, names of materials. */
   constructor(place, trajectory, scene, network, facts) {
@@ -101,7 +107,7 @@ class Player {
       return element("label", { class: "check" }, box, label);
     };
     const button = (text, label, press) => element("button", { type: "button", title: label, "aria-label": label, onclick: press }, text);
-    this.playButton = button("\u25b6", "Play", () => this.play(!this.playing));
+    this.playButton = button(icon(PLAY), "Play", () => this.play(!this.playing));
     this.slider = element("input", { type: "range", min: 0, max: last, step: 1, value: 0, "aria-label": "Frame",
       oninput: () => { this.play(false); this.go(Number(this.slider.value)); } });
     this.clock = element("output", { class: "clock" });
@@ -121,7 +127,7 @@ class Player {
     this.low = element("input", { type: "text", inputmode: "decimal", "aria-label": "Lower end of the colours", onchange: () => this.ranged() });
     this.high = element("input", { type: "text", inputmode: "decimal", "aria-label": "Upper end of the colours", onchange: () => this.ranged() });
     const range = element("fieldset", { class: "range" }, element("legend", {}, "Range"), this.low, element("span", {}, "to"), this.high,
-      button("\u21ba", "Range of this frame", () => this.rangeOfFrame()));
+      button("this frame", "Range of this frame", () => this.rangeOfFrame()));
     this.rangeBox = range;
     const sizes = choice("Size", [["", "radius"], ...changing.filter((one) => one.name !== "radius").map((one) => [one.name, this.label(one)])],
       (name) => this.viewer.set({ size: name || null }));
@@ -135,17 +141,21 @@ class Player {
       oninput: () => this.cut() });
     const shown = [];
     if (scene.bodies.length) shown.push(check("walls", true, (on) => this.viewer.set({ walls: on })));
-    if (scene.magnets.length) shown.push(check("magnets", true, (on) => this.viewer.set({ magnets: on })));
     if (scene.box) shown.push(check("box", true, (on) => this.viewer.set({ box: on })));
     if (this.network) shown.push(check("contacts", false, (on) => this.viewer.set({ contacts: on })));
     shown.push(check("outlines", true, (on) => this.viewer.set({ outlines: on })));
     shown.push(check("perspective", true, (on) => this.viewer.set({ flat: !on })));
+    const magnets = choice("Magnets", [["solid", "solid"], ["glass", "glass"], ["", "hidden"]], (how) => this.viewer.set({ magnets: how }));
+    if (scene.magnets.length) shown.unshift(magnets.label);
+    // Solid magnets would hide particles that are far smaller.
+    const clear = Math.min(...scene.magnets.map((one) => one.radius)) > 5 * scene.medianRadius;
+    this.viewer.options.magnets = magnets.select.value = clear ? "glass" : "solid";
     const views = [["x", 0, 0], ["y", -Math.PI / 2, 0], ["z", -Math.PI / 2, Math.PI / 2]].map(([axis, azimuth, elevation]) =>
       button(axis, `Look along ${axis}`, () => this.viewer.look(azimuth, elevation)));
     const group = (name, ...parts) => element("div", { class: "group", role: "group", "aria-label": name }, ...parts);
     this.place.append(stage,
       group("Playback", element("div", { class: "transport" },
-        button("\u23ee", "First frame", () => { this.play(false); this.go(0); }), this.playButton, this.slider, this.clock), rate.label),
+        button(icon("M4 3h2v10H4z M13 3v10L7 8z"), "First frame", () => { this.play(false); this.go(0); }), this.playButton, this.slider, this.clock), rate.label),
       element("details", { class: "settings", open: innerWidth > 700 }, element("summary", {}, "Colours, sizes, cut, view, downloads"),
         group("Colours", this.colour.label, this.maps.label, range),
         group("Sizes", sizes.label, element("label", {}, element("span", {}, "Scale"), scale), element("label", {}, element("span", {}, "Particle id"), search)),
@@ -237,7 +247,7 @@ class Player {
   play(on) {
     if (on === this.playing || (on && this.trajectory.frames < 2)) return;
     this.playing = on;
-    this.playButton.textContent = on ? "\u23f8" : "\u25b6";
+    this.playButton.replaceChildren(icon(on ? PAUSE : PLAY));
     for (const name of ["title", "aria-label"]) this.playButton.setAttribute(name, on ? "Pause" : "Play");
     if (!on) return this.go(this.frame);
     if (this.frame === this.trajectory.frames - 1) this.go(0);
@@ -276,15 +286,14 @@ class Player {
   setRange(low, high) {
     const column = this.trajectory.columns[this.viewer.options.colour];
     if (!(low < high)) [low, high] = [low - (Math.abs(low) || 1) * 1e-3, high + (Math.abs(high) || 1) * 1e-3];
-    this.low.value = Number(low.toPrecision(5));
-    this.high.value = Number(high.toPrecision(5));
+    [this.low.value, this.high.value] = [low, high].map((end) => number(end, 4));
     this.rangeBox.hidden = this.isClass(column);
     this.viewer.set({ range: [low, high] });
     this.applyMap();
   }
 
   ranged() {
-    const [low, high] = [this.low, this.high].map((input) => Number(input.value.replace("\u2212", "-")));
+    const [low, high] = [this.low, this.high].map((input) => Number(input.value.replaceAll("\u2212", "-")));
     if (Number.isFinite(low) && Number.isFinite(high) && low < high) this.setRange(low, high);
     else this.setRange(...this.viewer.options.range);
   }
@@ -317,7 +326,7 @@ class Player {
     this.legend.replaceChildren();
     this.legend.hidden = !column;
     if (!column) return;
-    this.legend.append(element("div", { class: "name" }, this.label(column)));
+    this.legend.append(element("div", { class: "name" }, this.label(column) + (column.logarithmic ? ", logarithmic" : "")));
     if (options.discrete) {
       options.map.forEach((rgb, k) => {
         const swatch = element("span", { class: "swatch" }), value = column.shown[0] + k;

@@ -83,6 +83,7 @@ flat in uint index;
 uniform sampler2D map;
 uniform vec4 plain;          // a colour for all bodies, if its alpha is 1
 uniform uint chosen, beyond;
+uniform float opacity;
 layout(location = 0) out vec4 colour;
 layout(location = 1) out uint picked;
 const vec2 NONE = vec2(1.0, -1.0);
@@ -179,7 +180,7 @@ void main() {
   vec3 shown = base * (0.34 + 0.16 * sky + 0.62 * lit) + 0.16 * gloss;
   if (capped) shown = base * 0.72;
   if (index == chosen) shown = mix(shown, vec3(1.0, 0.25, 0.55), 0.65);
-  colour = vec4(shown, 1.0);
+  colour = vec4(shown, opacity);
   picked = index + beyond;
   vec4 clip = projection * vec4(hit, 1.0);
   gl_FragDepth = 0.5 * clip.z / clip.w + 0.5;
@@ -193,10 +194,9 @@ layout(location = 3) in float weight;
 uniform mat4 pose;
 uniform vec2 screen;
 uniform vec2 width;          // pixels: width.x + width.y * weight
-out float strength;
+out float across, half_;      // pixels from the middle of the line, and half its width
 out vec3 at;
 void main() {
-  strength = weight;
   vec3 a = (view * pose * vec4(start, 1.0)).xyz, b = (view * pose * vec4(end, 1.0)).xyz;
   if (!flat_) {               // the part in front of the camera
     float near = -1e-3;
@@ -207,40 +207,44 @@ void main() {
   vec4 p = projection * vec4(a, 1.0), q = projection * vec4(b, 1.0), r = corner.x < 0.0 ? p : q;
   vec2 way = (q.xy / q.w - p.xy / p.w) * screen;
   way = length(way) > 1e-6 ? normalize(way) : vec2(1.0, 0.0);
-  vec2 aside = vec2(-way.y, way.x) * corner.y * (width.x + width.y * weight) / screen;
+  half_ = 0.5 * (width.x + width.y * weight);
+  across = corner.y * (half_ + 1.0);
+  vec2 aside = vec2(-way.y, way.x) * 2.0 * across / screen;
   at = corner.x < 0.0 ? a : b;
   gl_Position = vec4(r.xy + aside * r.w, r.zw);
 }`;
 
 const LINE_FRAGMENT = SHARED + `
-in float strength;
+in float across, half_;
 in vec3 at;
-uniform sampler2D map;
 uniform vec4 plain;
 layout(location = 0) out vec4 colour;
 void main() {
   if (cutting && dot(cut.xyz, at) > cut.w) discard;
-  colour = plain.a > 0.0 ? plain : vec4(texture(map, vec2(strength, 0.5)).rgb, 1.0);
+  colour = vec4(plain.rgb, plain.a * clamp(half_ + 0.5 - abs(across), 0.0, 1.0) * min(2.0 * half_, 1.0));
 }`;
 
 const WALL_VERTEX = SHARED + `
 layout(location = 0) in vec3 place;
+layout(location = 1) in vec3 normal;
 uniform mat4 pose;
 out vec3 at;
+flat out vec3 outward;
 void main() {
+  outward = mat3(view) * mat3(pose) * normal;
   at = (view * pose * vec4(place, 1.0)).xyz;
   gl_Position = projection * vec4(at, 1.0);
 }`;
 
 const WALL_FRAGMENT = SHARED + `
 in vec3 at;
+flat in vec3 outward;
 uniform vec4 plain;
 layout(location = 0) out vec4 colour;
 void main() {
   if (cutting && dot(cut.xyz, at) > cut.w) discard;
-  vec3 normal = normalize(cross(dFdx(at), dFdy(at)));
   vec3 ray = flat_ ? vec3(0.0, 0.0, -1.0) : normalize(at);
-  float edge = 1.0 - abs(dot(normal, ray));          // more opaque at grazing angles, as glass is
+  float edge = 1.0 - abs(dot(outward, ray));         // more opaque at grazing angles, as glass is
   colour = vec4(plain.rgb, plain.a * (0.6 + 1.8 * edge * edge));
 }`;
 
@@ -260,10 +264,10 @@ float distance_(ivec2 p) {
   float z = 2.0 * texelFetch(depth, clamp(p, ivec2(0), textureSize(depth, 0) - 1), 0).r - 1.0;
   return lens.z > 0.5 ? (lens.y - z) / lens.x : lens.y / (z + lens.x);
 }
-float response(ivec2 p, float here, float reach) {
+float response(ivec2 p, float here, float reach, float turn) {
   float sum = 0.0;
   for (int k = 0; k < 8; k++) {
-    float angle = 0.785398 * float(k) + reach;
+    float angle = 0.785398 * float(k) + turn;
     float nearer = (here - distance_(p + ivec2(round(reach * vec2(cos(angle), sin(angle)))))) / lens.w;
     sum += nearer > 0.0 ? nearer / (1.0 + 0.25 * nearer * nearer) : 0.0;
   }
@@ -278,8 +282,10 @@ void main() {
     float z = texelFetch(depth, p, 0).r, dark = 1.0;
     if (z < 1.0 && strength > 0.0) {
       float away = distance_(p), scale = float(samples);
-      float edge = response(p, away, 1.2 * scale) + 0.8 * response(p, away, wide * scale)
-        + 0.5 * response(p, away, 2.6 * wide * scale);
+      // Other directions and lengths for each of the pixels that are averaged.
+      float turn = fract(0.61803 * float(k) + 0.5 * float((p.x ^ p.y) & 1)), longer = 0.75 + 0.5 * turn;
+      float edge = response(p, away, 1.2 * scale, 0.0) + 0.8 * response(p, away, longer * wide * scale, turn)
+        + 0.5 * response(p, away, 2.6 * longer * wide * scale, 2.0 * turn);
       dark = exp(-strength * edge);
     }
     sum += mix(ground, here.rgb / max(here.a, 1e-3) * dark, here.a);
@@ -306,7 +312,7 @@ const Matrix = {
 
 const FIELD_OF_VIEW = 26 * Math.PI / 180;
 const CORNERS = new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]);
-const LEAST_PIXELS = 1.2;       // radius of a particle on the screen, so that it is visible
+const LEAST_PIXELS = 1.6;       // radius of a particle on the screen, so that it is visible
 const FIRST_VIEW = { azimuth: -62 * Math.PI / 180, elevation: 18 * Math.PI / 180 };
 
 class Viewer {
@@ -319,7 +325,7 @@ class Viewer {
     this.frame = 0;
     this.chosen = -1;
     this.options = {
-      colour: null, range: [0, 1], map: null, size: null, scale: 1, flat: false, walls: true, magnets: true,
+      colour: null, range: [0, 1], map: null, size: null, scale: 1, flat: false, walls: true, magnets: "solid",
       box: true, contacts: false, outlines: true, cut: null, dark: false,
     };
     const { low, high } = scene.focus;
@@ -338,7 +344,7 @@ class Viewer {
   }
 
   home() {
-    const zoomedOut = 1.08 / Math.sin(FIELD_OF_VIEW / 2);
+    const zoomedOut = 0.94 / Math.sin(FIELD_OF_VIEW / 2);
     this.camera = { ...FIRST_VIEW, distance: zoomedOut, target: [0, 0, 0] };
     this.invalidate();
   }
@@ -375,7 +381,7 @@ class Viewer {
       walls: this.program(WALL_VERTEX, WALL_FRAGMENT),
       screen: this.program(SCREEN_VERTEX, SCREEN_FRAGMENT),
     };
-    this.maps = { colours: this.texture(), grey: this.texture() };
+    this.colourMap = this.texture();
     this.square = this.vertexArray([[0, CORNERS, 2, 0]]);
     this.particles = this.vertexArray([[0, CORNERS, 2, 0]]);
     this.particles.shapes = this.shapeTable(this.scene.shapes);
@@ -446,14 +452,19 @@ class Viewer {
   }
 
   buildBody(body) {
-    const gl = this.gl, n = body.vertices.length / 3, vertices = new Float32Array(body.vertices.length);
-    for (let k = 0; k < 3 * n; k++) vertices[k] = (body.vertices[k] - this.centre[k % 3]) / this.unit;
-    const own = this.vertexArray([[0, vertices, 3, 0]]), triangles = gl.createBuffer();
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, triangles);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(body.triangles), gl.STATIC_DRAW);
+    const corner = (k) => this.relative(body.vertices.slice(3 * k, 3 * k + 3)), places = [], normals = [];
+    for (let m = 0; m < body.triangles.length; m += 3) {
+      const [a, b, c] = body.triangles.slice(m, m + 3).map(corner);
+      const [p, q] = [b, c].map((end) => end.map((x, k) => x - a[k]));
+      const normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+      const size = Math.hypot(...normal) || 1;
+      places.push(...a, ...b, ...c);
+      for (let k = 0; k < 3; k++) normals.push(...normal.map((x) => x / size));
+    }
+    const own = this.vertexArray([[0, new Float32Array(places), 3, 0], [1, new Float32Array(normals), 3, 0]]);
     const ends = [];
-    for (const k of body.lines) ends.push(vertices[3 * k], vertices[3 * k + 1], vertices[3 * k + 2]);
-    return { ...own, count: body.triangles.length, lines: this.lines(ends), poses: body.poses };
+    for (const k of body.lines) ends.push(...corner(k));
+    return { ...own, count: places.length / 3, lines: this.lines(ends), poses: body.poses };
   }
 
   /** ends : three coordinates of both ends of each line, relative. */
@@ -525,7 +536,7 @@ class Viewer {
         for (let m = 0; m < 3; m++) b[m] -= turns * rows[axis][m];
       }
       ends.push(...this.relative(a), ...this.relative(b));
-      weights.push(Math.sqrt(depth / this.network.largest));
+      weights.push(Math.min(1, depth / this.network.usual) ** 1.5);   // as Hertz's force
     });
     this.lines(ends, new Float32Array(weights), this.contactLines);
   }
@@ -535,7 +546,7 @@ class Viewer {
     const gl = this.gl, data = new Uint8Array(4 * map.length).fill(255);
     map.forEach((rgb, k) => data.set(rgb, 4 * k));
     Object.assign(this.options, { map, discrete });
-    gl.bindTexture(gl.TEXTURE_2D, this.maps.colours);
+    gl.bindTexture(gl.TEXTURE_2D, this.colourMap);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, map.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, data);
     for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
       gl.texParameteri(gl.TEXTURE_2D, side, discrete ? gl.NEAREST : gl.LINEAR);
@@ -659,10 +670,17 @@ class Viewer {
     gl.depthMask(true);
     gl.disable(gl.BLEND);
     this.drawParticles(lens, samples);
-    if (this.magnets && options.magnets) this.drawMagnets(lens);
+    if (this.magnets && options.magnets === "solid") this.drawMagnets(lens, 1);
+    // Lines and walls cover pixels in part, and cannot be picked.
     gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.NONE]);
-    this.drawLines(lens, samples);
+    gl.enable(gl.BLEND);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    if (this.magnets && options.magnets === "glass") this.drawMagnets(lens, 0.22);
     if (options.walls) this.drawWalls(lens);
+    this.drawLines(lens, samples);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
     this.finish(lens, samples, image);
     for (const listener of this.listeners) listener(lens);
   }
@@ -694,8 +712,9 @@ class Viewer {
     gl.uniform4f(places.plain, 0.42, 0.6, 0.78, colour ? 0 : 1);
     gl.uniform1ui(places.chosen, this.chosen + 1);
     gl.uniform1ui(places.beyond, 0);
+    gl.uniform1f(places.opacity, 1);
     gl.uniform1i(places.turned, Boolean(orientation));
-    this.bindMap(places, this.maps.colours, this.particles.shapes);
+    this.bindMap(places, this.colourMap, this.particles.shapes);
     gl.bindVertexArray(this.particles.array);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, trajectory.particles);
   }
@@ -710,7 +729,7 @@ class Viewer {
     gl.uniform1i(places.shapes, 1);
   }
 
-  drawMagnets(lens) {
+  drawMagnets(lens, opacity) {
     const gl = this.gl, places = this.use("magnets", lens);
     gl.uniform3f(places.origin, 0, 0, 0);
     gl.uniform3f(places.step_, 1, 1, 1);
@@ -721,8 +740,9 @@ class Viewer {
     gl.uniform4f(places.plain, 0.62, 0.64, 0.68, 1);
     gl.uniform1ui(places.chosen, 0);
     gl.uniform1ui(places.beyond, 0x40000000);
+    gl.uniform1f(places.opacity, opacity);
     gl.uniform1i(places.turned, true);
-    this.bindMap(places, this.maps.colours, this.magnets.shapes);
+    this.bindMap(places, this.colourMap, this.magnets.shapes);
     gl.bindVertexArray(this.magnets.array);
     gl.vertexAttrib1f(6, 1);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.scene.magnets.length);
@@ -748,27 +768,19 @@ class Viewer {
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, lines.count);
     };
     gl.uniform2f(places.screen, this.canvas.width * samples, this.canvas.height * samples);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.maps.colours);
-    gl.uniform1i(places.map, 0);
     if (options.box) draw(this.boxLines, null, [ink, ink, ink, 1], [0.9, 0]);
     if (options.walls) for (const body of this.bodies) draw(body.lines, body, [ink, ink * 1.02, ink * 1.06, 1], [1.1, 0]);
-    if (options.contacts && this.network) draw(this.contactLines, null, options.dark ? [0.98, 0.72, 0.3, 1] : [0.72, 0.2, 0.1, 1], [0.5, 6]);
+    if (options.contacts && this.network) draw(this.contactLines, null, options.dark ? [0.98, 0.72, 0.3, 1] : [0.72, 0.2, 0.1, 1], [0.4, 6]);
   }
 
   drawWalls(lens) {
     const { gl, options } = this, places = this.use("walls", lens);
-    gl.enable(gl.BLEND);
-    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.depthMask(false);
     for (const body of this.bodies) {
       gl.uniformMatrix4fv(places.pose, false, this.pose(body));
       gl.uniform4f(places.plain, ...(options.dark ? [0.62, 0.72, 0.84, 0.08] : [0.42, 0.52, 0.64, 0.09]));
       gl.bindVertexArray(body.array);
-      gl.drawElements(gl.TRIANGLES, body.count, gl.UNSIGNED_INT, 0);
+      gl.drawArrays(gl.TRIANGLES, 0, body.count);
     }
-    gl.depthMask(true);
-    gl.disable(gl.BLEND);
   }
 
   finish(lens, samples, image) {
@@ -788,7 +800,7 @@ class Viewer {
     gl.uniform4f(places.lens, p[10], p[14], options.flat, Math.max(radius, 2 * radius / Math.max(onScreen, 0.5)));
     gl.uniform3fv(places.low, options.dark ? [0.055, 0.065, 0.085] : [0.93, 0.945, 0.96]);
     gl.uniform3fv(places.high, options.dark ? [0.105, 0.12, 0.15] : [1, 1, 1]);
-    gl.uniform1f(places.strength, options.outlines ? 0.5 : 0);
+    gl.uniform1f(places.strength, options.outlines ? 0.5 * Math.min(1, onScreen / 4) : 0);
     gl.uniform1f(places.wide, Math.min(Math.max(0.5 * onScreen, 2), 12));
     gl.uniform1i(places.samples, samples);
     gl.bindVertexArray(this.square.array);
