@@ -69,8 +69,16 @@ class DrawnBody:
     mesh: Mesh
     poses: np.ndarray = field(default_factory=lambda: np.empty((0, 7)))
 
+    def places(self) -> np.ndarray:
+        """Return its vertices in space (m) at the first and at the last frame, shape (n, 3)."""
+        if not len(self.poses):
+            return self.mesh.vertices
+        ends = self.poses[[0, -1]]
+        turned = [Rotation.from_quat(pose[3:]).apply(self.mesh.vertices) + pose[:3] for pose in ends]
+        return np.concatenate(turned)
+
     def facts(self) -> dict[str, object]:
-        """Return it as plain data, coordinates rounded to DIGITS digits."""
+        """Return it as plain data, with coordinates of DIGITS digits."""
         return {
             "name": self.name, "vertices": _digits(self.mesh.vertices),
             "triangles": self.mesh.triangles.ravel().tolist(), "lines": self.mesh.lines.ravel().tolist(),
@@ -87,6 +95,11 @@ class DrawnMagnet:
     radius: float
     length: float
     axis: tuple[float, float, float]
+
+    def ends(self) -> np.ndarray:
+        """Return both ends of its axis (m), shape (2, 3)."""
+        half = 0.5 * self.length * np.array(self.axis)
+        return np.array(self.centre) + np.stack([-half, half])
 
     def facts(self) -> dict[str, object]:
         """Return it as plain data."""

@@ -166,7 +166,8 @@ def _best_order(whole: np.ndarray) -> int:
 def _entropy(planes: np.ndarray) -> float:
     """Return the sum over planes of the entropy of their bytes, in bits."""
     total = 0.0
-    for plane in planes.reshape(-1, planes.shape[2] * planes.shape[3]):
+    parts, size, particles, frames = planes.shape
+    for plane in planes.reshape(parts * size, particles * frames):
         share = np.bincount(plane, minlength=256) / max(plane.size, 1)
         total -= float((share[share > 0] * np.log2(share[share > 0])).sum())
     return total

@@ -38,8 +38,14 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         for name, values in sequence.measures.items()
         if name.endswith("_travel")
     }
-    walls = bodies.bodies(scene, trajectory.times, travel, *focus)
     magnets = bodies.magnets(scene)
+    for magnet in magnets:
+        centre = np.array(magnet.centre)
+        focus = np.minimum(focus[0], centre - magnet.radius), np.maximum(focus[1], centre + magnet.radius)
+    walls = bodies.bodies(scene, trajectory.times, travel, *focus)
+    low, high = np.minimum(low, focus[0]), np.maximum(high, focus[1])
+    for points in (*(body.places() for body in walls), *(magnet.ends() for magnet in magnets)):
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     return {
         "box": box, "low": low.tolist(), "high": high.tolist(),
         "focus": {"low": focus[0].tolist(), "high": focus[1].tolist()},
