@@ -85,7 +85,7 @@ def test_the_page_says_what_was_asked_and_what_happened(record, tmp_path):
     assert cells("momentum along z", 4) == ["kg m/s", "0", "0.002", "0.002"]
     assert cells("kinetic energy of translation", 4) == ["J", "0", "0.002", "0.002"]
     assert cells("young", 3) == ["1e+07", "Pa", "Young's modulus E"]
-    assert cells("acceleration", 2) == ["(0, 0, -9.80665)", "m/s^2"]
+    assert cells("acceleration", 2) == ["(0, 0, -9.80665)", "m/s\u00b2"]
     assert "unfinished" in rows
     assert any(row.startswith("the run has come to t = 0.02 s of 1 s") for row in rows)
     assert asked.to_toml().strip() in text
@@ -133,7 +133,7 @@ def test_the_command_writes_the_page_of_a_run(tisim, toml, tmp_path, monkeypatch
     assert tisim("report", "out") == (0, "out/report.html\n", "")
     data, text = facts_of(tmp_path / "out" / "report.html")
     assert "own plot" in text
-    assert "device cpu, precision f64" in text
+    assert "Run on device cpu, precision f64" in text
     with frames(tmp_path / "out" / "trajectory.h5") as sequence:
         assert len(data["trajectory"]["times"]) == len(sequence) == 4
     assert tisim("report", "out")[0] == 0, "its own page is replaced"

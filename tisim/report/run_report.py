@@ -19,6 +19,7 @@ from tisim.files import regular_file
 from tisim.files.atomic import replace_file
 from tisim.io.reader import Frames, frames
 from tisim.plotting import time_series
+from tisim.plotting.style import superscripts
 from tisim.reading import read
 from tisim.report import tables
 from tisim.report.columns import Column
@@ -29,6 +30,7 @@ from tisim.report.page import Page, Section, picture, table
 from tisim.report.scenery import colour_maps, scenery
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
+from tisim.version import __version__
 
 LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
@@ -255,7 +257,8 @@ def _asked(scene: Scene) -> str:
 
 def _part_rows(role: str, part: Part) -> str:
     summary = "" if part.summary in ("a material", "contact properties") else part.summary
-    return _part_row(role, part.name, summary, part.source) + "".join(map(_setting_row, part.parameters))
+    rows = (_setting_row(row, row[0] in part.off) for row in part.parameters)
+    return _part_row(role, part.name, summary, part.source) + "".join(rows)
 
 
 def _part_row(role: str, name: str, summary: str, source: str) -> str:
@@ -266,11 +269,13 @@ def _part_row(role: str, name: str, summary: str, source: str) -> str:
     )
 
 
-def _setting_row(row: Sequence[str]) -> str:
+def _setting_row(row: Sequence[str], off: bool = False) -> str:
+    """Return a setting as a row; one that leaves something out, as by default, is ``off``."""
     name, value, unit, text = row
     return (
-        f'<tr><th scope="row">{escape(name)}</th><td class="value">{escape(value)}</td>'
-        f"<td>{escape(unit)}</td><td>{escape(text)}</td></tr>"
+        f'<tr{" class=off" if off else ""}><th scope="row">{escape(name)}</th>'
+        f'<td class="value">{escape(value)}</td><td>{escape(superscripts(unit))}</td>'
+        f"<td>{escape(text)}</td></tr>"
     )
 
 
@@ -296,10 +301,11 @@ def _accuracy(one: Column) -> str:
 
 def _versions(result: Result | None) -> str:
     """Return a sentence about the settings of a run."""
+    made = f"Written by tisim {__version__}."
     if result is None:
-        return ""
+        return made
     settings = result.settings
     names = ("device", "precision", "arithmetic", "threads")
     told = [f"{name} {settings[name]}" for name in names if name in settings]
     edited = f" Edited during the run: {settings['edited']}." if "edited" in settings else ""
-    return f"{', '.join(told)}; wall time {result.wall_s:.3g} s.{edited}"
+    return f"Run on {', '.join(told)}; wall time {result.wall_s:.3g} s.{edited} {made}"

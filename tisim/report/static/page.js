@@ -45,18 +45,22 @@ function themes(player) {
   apply(media.matches);
 }
 
-async function start() {
-  const facts = json("facts"), bytes = fromBase64(document.getElementById("recording").textContent);
-  const place = document.getElementById("viewer");
-  tables();
+async function decode(facts) {
+  const bytes = fromBase64(document.getElementById("recording").textContent);
   let begin = 0;
   const parts = facts.lengths.map((length) => bytes.subarray(begin, begin += length));
   report.trajectory = await Trajectory.decode(facts.trajectory, parts);
   report.network = facts.network ? await ContactNetwork.decode(facts.network, parts.at(-1)) : null;
+}
+
+async function start() {
+  const facts = json("facts"), place = document.getElementById("viewer");
+  tables();
   try {
+    await decode(facts);
     report.player = new Player(place, report.trajectory, facts.scene, report.network, facts);
   } catch (error) {
-    place.append(element("p", { class: "warning", role: "alert" }, error.message));
+    place.replaceChildren(element("p", { class: "warning", role: "alert" }, `The particles cannot be shown: ${error.message}`));
   }
   place.classList.remove("waiting");
   const jump = (time) => {

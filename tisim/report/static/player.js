@@ -326,7 +326,10 @@ class Player {
     this.legend.replaceChildren();
     this.legend.hidden = !column;
     if (!column) return;
-    this.legend.append(element("div", { class: "name" }, this.label(column) + (column.logarithmic ? ", logarithmic" : "")));
+    const ends = options.range.map(Math.abs), name = this.label({ ...column, unit: "" });
+    const [by, unit] = options.discrete || column.logarithmic ? [1, raised(column.unit)] : axisUnit(Math.max(...ends), column.unit);
+    const notes = [unit, column.logarithmic ? "logarithmic" : ""].filter(Boolean).join(", ");
+    this.legend.append(element("div", { class: "name" }, notes ? `${name} (${notes})` : name));
     if (options.discrete) {
       options.map.forEach((rgb, k) => {
         const swatch = element("span", { class: "swatch" }), value = column.shown[0] + k;
@@ -338,7 +341,7 @@ class Player {
     }
     const strip = element("div", { class: "strip" });
     strip.style.background = `linear-gradient(to right, ${options.map.map((rgb) => `rgb(${rgb})`).join(",")})`;
-    this.legend.append(strip, element("div", { class: "ends" }, ...this.ticks(column).map((value) => element("span", {}, number(value, 3)))));
+    this.legend.append(strip, element("div", { class: "ends" }, ...this.ticks(column).map((value) => element("span", {}, number(value / by, 3)))));
   }
 
   /** Values at the ends and in the middle of the legend. */
