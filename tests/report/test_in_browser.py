@@ -46,12 +46,12 @@ def until(page, condition):
     raise AssertionError(condition)
 
 
-def drifting(rng, n=60, count=12):
+def drifting(rng, n=300, count=12):
     """Frames of particles that move, of which some come and go."""
     start, speed = rng.uniform(-0.009, 0.009, (n, 3)), rng.uniform(-0.1, 0.1, (n, 3))
     made = []
     for k in range(count):
-        ids = np.array([one for one in range(n) if (one + k) % 7 or one < 5])
+        ids = np.array([one for one in range(n) if (one + k) % 37 or one < 5])
         places = np.mod(start[ids] + 0.01 * k * speed[ids] + 0.01, 0.02) - 0.01
         made.append({"id": ids, "position": places, "velocity": speed[ids] * (1 + k)})
     return made
@@ -61,7 +61,7 @@ def drifting(rng, n=60, count=12):
 def moving(record, rng, tmp_path):
     """A report on particles that move, its trajectory and its frames."""
     made = drifting(rng)
-    path = record(scene(60, name=HOSTILE), made)
+    path = record(scene(300, name=HOSTILE), made)
     return run_report(path, tmp_path / "report.html"), path, made
 
 
@@ -76,6 +76,8 @@ def test_the_positions_are_those_of_the_file(moving, opened):
             "  report.trajectory.columns.speed.value(f, row)]))"
         )
         rounding = page.evaluate("report.trajectory.columns.speed.rounding")
+        orders = page.evaluate("Object.values(report.trajectory.columns).map((one) => one.order)")
+    assert set(orders) >= {0, 2}
     for frame, rows in zip(made, shown, strict=True):
         by_id = {int(row[0]): row[1:] for row in rows if row[0] >= 0}
         assert sorted(by_id) == frame["id"].tolist()
@@ -124,7 +126,6 @@ def test_playback_changes_the_picture_and_stops_at_the_end(moving, opened):
         assert first != last
         assert page.get_by_role("button", name="Play").is_visible()
         assert page.inner_text("output.clock") == "t = 110 ms"
-        assert "55 particles" not in page.inner_text("[aria-live]")
         number = len(made[-1]["id"])
         assert page.text_content("[aria-live]") == f"t = 110 ms, {number} particles"
         page.select_option("text=Speed >> xpath=../select", "4")

@@ -33,7 +33,7 @@ function undifferenced(facts, planes, rows) {
         if (frame === 0 || facts.order === 0) {
           value = change;
         } else {
-          slope = facts.order === 2 && frame > 1 ? (slope + change) | 0 : change;
+          slope = facts.order === 2 ? (slope + change) | 0 : change;
           value = (value + slope) | 0;
         }
         whole[(frame * rows + row) * parts + part] = value;
