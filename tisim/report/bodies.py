@@ -31,7 +31,7 @@ AROUND_AXIS = 64
 """Number of sides that a circle is drawn with."""
 AROUND_SPHERE = 24
 """Number of rings of triangles of a sphere."""
-DIGITS = 6
+COORDINATE_DIGITS = 6
 """Significant digits of coordinates in a report."""
 
 
@@ -78,7 +78,7 @@ class DrawnBody:
         return np.concatenate(turned)
 
     def facts(self) -> dict[str, object]:
-        """Return it as plain data, with coordinates of DIGITS digits."""
+        """Return it as plain data, with coordinates of COORDINATE_DIGITS digits."""
         return {
             "name": self.name, "vertices": _digits(self.mesh.vertices),
             "triangles": self.mesh.triangles.ravel().tolist(), "lines": self.mesh.lines.ravel().tolist(),
@@ -110,8 +110,8 @@ class DrawnMagnet:
 
 
 def _digits(values: np.ndarray) -> list[float]:
-    """Return numbers rounded to DIGITS significant digits, in a row."""
-    return [float(f"{value:.{DIGITS}g}") for value in values.ravel().tolist()]
+    """Return numbers rounded to COORDINATE_DIGITS significant digits, in a row."""
+    return [float(f"{value:.{COORDINATE_DIGITS}g}") for value in values.ravel().tolist()]
 
 
 def magnets(scene: Scene) -> list[DrawnMagnet]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-DTYPES = {8: np.uint8, 16: np.uint16, 32: np.uint32}
+WHOLE_TYPES = {8: np.uint8, 16: np.uint16, 32: np.uint32}
 """Types of whole numbers by their number of bits."""
 HIGHEST_ORDER = 2
 """Largest order of the differences in time."""
@@ -106,7 +106,7 @@ def column(
 def whole_numbers(one: Column, particles: int) -> np.ndarray:
     """Return the whole numbers of a compressed quantity of some particles, shape (frames, particles,
     components)."""
-    kind, parts = DTYPES[one.scale.bits], len(one.scale.origin)
+    kind, parts = WHOLE_TYPES[one.scale.bits], len(one.scale.origin)
     size = np.dtype(kind).itemsize
     planes = np.frombuffer(zlib.decompress(one.data), np.uint8).reshape(parts, size, particles, one.frames)
     little_endian = np.moveaxis(planes, 1, -1).copy().view(np.dtype(kind).newbyteorder("<"))
@@ -132,7 +132,7 @@ def rounded(values: np.ndarray, scale: Scale) -> np.ndarray:
     step = np.where(np.array(scale.step) > 0, scale.step, 1.0)
     whole = np.rint((known - np.array(scale.origin)) / step)
     whole = np.clip(whole, 0, scale.largest - scale.missing)
-    return np.where(finite, whole, scale.largest).astype(DTYPES[scale.bits])
+    return np.where(finite, whole, scale.largest).astype(WHOLE_TYPES[scale.bits])
 
 
 def _differences(whole: np.ndarray, order: int) -> np.ndarray:

@@ -20,17 +20,18 @@ import numpy as np
 
 from tisim.domains.domain import Domain
 from tisim.effects.base import Shaped
+from tisim.effects.base.shaped import ORIENTATION
 from tisim.errors import Words, must
 from tisim.io.h5md import ABSENT
 from tisim.io.reader import Frame
 from tisim.io.run_folder import units
-from tisim.report.columns import DTYPES, Column, Scale, column, rounded, uniform_scale, whole_numbers
+from tisim.report.columns import WHOLE_TYPES, Column, Scale, column, rounded, uniform_scale, whole_numbers
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
-FINE = 32.0
+BINS_PER_RADIUS = 32.0
 """A bin is at most the radius of small particles over this number, or there are 2^24 bins."""
-SMALL = 5.0
+SMALL_RADIUS = 5.0
 """Percentile of the radii that counts as small."""
 EXACT_VALUES = 4_000_000
 """Up to this number of values, quantities that change are rounded to 16 bits, otherwise to 8."""
@@ -39,9 +40,10 @@ WIDE_RANGE = 30.0
 median is in the lowest tenth of the range."""
 USUAL = (0.5, 99.5)
 """Percentiles between which values are coloured at first, if the range is more than twice as wide."""
+FROM_ZERO = 0.05
+"""A linear scale of colours begins at 0 if its lower end would be below this part of the upper end."""
 SAMPLED_VALUES = 200_000
 """Number of values of a quantity from which percentiles are computed."""
-ORIENTATION = "orientation"
 
 
 class FrameSequence(Protocol):
@@ -131,7 +133,7 @@ def quantities(arrays: Arrays) -> dict[str, np.ndarray]:
     lengths of vectors, such as ``speed``."""
     found = {}
     for name, values in arrays.items():
-        if name in ("position", "id", ORIENTATION):
+        if name in ("position", "id", ORIENTATION.name):
             continue
         if values.ndim == 1:
             found[name] = values
@@ -211,7 +213,7 @@ def _survey(frames: FrameSequence, chosen: Sequence[int], part: int) -> _Survey:
                 _extend(ranges, name, values, max(1, len(values) * len(chosen) // SAMPLED_VALUES))
     if not radii:
         low, high, corners = np.zeros(3), np.ones(3), (np.zeros(3), np.ones(3))
-    small = float(np.percentile(np.concatenate(radii), SMALL)) if radii else 1.0
+    small = float(np.percentile(np.concatenate(radii), SMALL_RADIUS)) if radii else 1.0
     common = {name: ranges[name] for name in ranges if name in (names or ())}
     return _Survey(rows, row_of, np.array(counts), low, high, corners, small, common)
 
@@ -239,8 +241,8 @@ def _columns(
     }
     turned = any(isinstance(one, Shaped) for one in scene.effects)
     ids = np.full((*shape, 1), ABSENT, np.int32)
-    places = np.zeros((*shape, 3), DTYPES[bins.bits])
-    whole = {name: np.zeros((*shape, 1), DTYPES[scale.bits]) for name, scale in scales.items()}
+    places = np.zeros((*shape, 3), WHOLE_TYPES[bins.bits])
+    whole = {name: np.zeros((*shape, 1), WHOLE_TYPES[scale.bits]) for name, scale in scales.items()}
     turns = np.zeros((*shape, 4))
     absent = np.ones(survey.rows, bool)
     for m, (k, row) in enumerate(zip(chosen, survey.row_of, strict=True)):
@@ -255,7 +257,7 @@ def _columns(
         for name, scale in scales.items():
             whole[name][m, row] = rounded(here[name][:, None].astype(float), scale)
         if turned:
-            turns[m, row] = _continued(arrays[ORIENTATION].astype(float), turns[m, row])
+            turns[m, row] = _continued(arrays[ORIENTATION.name].astype(float), turns[m, row])
         # A row takes the values of its first particle from the beginning.
         for stored in (places, turns, *whole.values()):
             stored[:m, row[absent[row]]] = stored[m, row[absent[row]]]
@@ -266,7 +268,7 @@ def _columns(
     ]
     if turned:
         scale = uniform_scale([(-1.0, 1.0)] * 4, 16)
-        columns.append(column(ORIENTATION, "", scale, rounded(turns, scale)))
+        columns.append(column(ORIENTATION.name, "", scale, rounded(turns, scale)))
     for name in names:
         shown = _shown(survey.ranges[name])
         columns.append(column(name, _unit(name, unit_of), scales[name], whole[name], shown))
@@ -286,7 +288,7 @@ def _bins(domain: Domain, survey: _Survey) -> Scale:
         joined = np.array(domain.joined())
         low, high = np.where(joined, box_low, low), np.where(joined, box_high, high)
     side = np.maximum(high - low, 1e-9 * max(float((high - low).max()), survey.small))
-    coarse = float(side.max()) / 2**16 > survey.small / FINE
+    coarse = float(side.max()) / 2**16 > survey.small / BINS_PER_RADIUS
     # The lowest 8 of 32 bits are 0, because single precision, in which graphics compute, has 24.
     bits, unused = (32, 8) if coarse else (16, 0)
     step = side / 2**bits
@@ -300,7 +302,7 @@ def _binned(position: np.ndarray, bins: Scale, domain: Domain) -> np.ndarray:
     low = np.array(bins.origin) - 0.5 * step
     bin_ = np.floor((position - low) / step)
     inside = np.where(np.array(domain.joined()), np.mod(bin_, number), np.clip(bin_, 0, number - 1))
-    return inside.astype(DTYPES[bins.bits]) << DTYPES[bins.bits](bins.unused)
+    return inside.astype(WHOLE_TYPES[bins.bits]) << WHOLE_TYPES[bins.bits](bins.unused)
 
 
 def _continued(turns: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -313,7 +315,7 @@ def _scale(found: _Range, bits: int) -> Scale:
     """Return the scale of a quantity: whole numbers are exact, and the end of the range of others is."""
     low, high = (found.low, found.high) if found.low <= found.high else (0.0, 0.0)
     if found.whole:
-        needed = next(n for n in DTYPES if high - low < 2**n)
+        needed = next(n for n in WHOLE_TYPES if high - low < 2**n)
         return Scale(needed, (low,), (1.0,))
     if _spreads(found):
         ends = uniform_scale([(float(np.log(low)), float(np.log(high)))], bits, not found.finite)
@@ -334,4 +336,10 @@ def _shown(found: _Range) -> tuple[float, float]:
         return 0.0, 1.0
     usual = np.percentile(np.concatenate(found.sample), USUAL)
     outliers = found.high - found.low > 2 * (usual[1] - usual[0]) > 0
-    return (float(usual[0]), float(usual[1])) if outliers and not found.whole else (found.low, found.high)
+    low, high = (
+        (float(usual[0]), float(usual[1])) if outliers and not found.whole else (found.low, found.high)
+    )
+    # Such as speeds: a scale from 0 is easier to read.
+    return (
+        (0.0, high) if 0 <= low < FROM_ZERO * high and not (found.whole or _spreads(found)) else (low, high)
+    )

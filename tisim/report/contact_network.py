@@ -20,10 +20,10 @@ from tisim.report.columns import ZLIB_LEVEL
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence
 from tisim.scene.scene import Scene
 
-MOST_CONTACTS = 4_000_000
+MOST_STORED_CONTACTS = 4_000_000
 """Largest number of contacts, summed over the frames, for which a network is stored."""
 USUAL_OVERLAP = 99.0
-OVERLAPS = 255
+OVERLAP_STEPS = 255
 """Number of steps of the scale of overlaps."""
 
 
@@ -57,7 +57,7 @@ class ContactNetwork:
         return {
             "intervals": len(self.pairs), "overlaps": len(self.overlaps), "largest": self.largest,
             "usual": self.usual,
-            "steps": OVERLAPS,
+            "steps": OVERLAP_STEPS,
         }  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def has_contacts(scene: Scene) -> bool:
 
 def contact_network(frames: FrameSequence, trajectory: CompressedTrajectory) -> ContactNetwork | None:
     """Return the contacts of the frames of a compressed trajectory: overlapping spheres; None if there are
-    none, or more than MOST_CONTACTS."""
+    none, or more than MOST_STORED_CONTACTS."""
     ids = trajectory.ids()
     keys, counts, depths, total = [], [], [], 0
     for m, k in enumerate(trajectory.indices.tolist()):
@@ -84,7 +84,7 @@ def contact_network(frames: FrameSequence, trajectory: CompressedTrajectory) -> 
         apart = np.linalg.norm(nearest_image(position[j] - position[i], sides), axis=1)
         low, high = np.minimum(row[i], row[j]), np.maximum(row[i], row[j])
         total += len(i)
-        if total > MOST_CONTACTS:
+        if total > MOST_STORED_CONTACTS:
             return None
         keys.append(low * trajectory.particles + high)
         counts.append(np.full(len(i), m))
@@ -105,6 +105,6 @@ def _network(
     last = np.append(first[1:], len(key)) - 1
     low, high = np.divmod(key[first], particles)
     largest = float(overlap.max())
-    steps = np.rint(overlap / (largest or 1.0) * OVERLAPS).astype(np.uint8)
+    steps = np.rint(overlap / (largest or 1.0) * OVERLAP_STEPS).astype(np.uint8)
     pairs = np.stack([low, high, when[first], when[last]], axis=1)
     return ContactNetwork(pairs, steps, largest, float(np.percentile(overlap, USUAL_OVERLAP)))

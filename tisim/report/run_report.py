@@ -32,9 +32,9 @@ from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.version import __version__
 
-LIMIT = 15.0
+SIZE_LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
-REST = 0.25e6
+RESERVED_BYTES = 0.25e6
 """Bytes that are reserved for everything but the recording and pictures, in characters of the page."""
 LONGEST_TOML = 200_000
 """Number of characters from which on a scene is not shown as text."""
@@ -53,7 +53,7 @@ class ReportOptions:
     checks : rows of text of a table of checks, from ``read_checks``.
     """
 
-    limit: float = LIMIT
+    limit: float = SIZE_LIMIT
     fields: Sequence[str] | None = None
     contacts: bool = True
     pictures: Mapping[str, bytes] = field(default_factory=dict)
@@ -158,7 +158,7 @@ def _recording(
     sequence: FrameSequence, options: ReportOptions
 ) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
     """Return the frames that the limit allows, with their contacts, and sentences about those left out."""
-    room = options.limit * 1e6 - REST - sum(4 / 3 * len(png) for png in options.pictures.values())
+    room = options.limit * 1e6 - RESERVED_BYTES - sum(4 / 3 * len(png) for png in options.pictures.values())
     room = 0.75 * max(room, 0.1e6)
     count, particles = len(sequence), max(len(sequence[k].arrays["id"]) for k in (0, -1))
     # A particle takes at least a byte in a frame; frames that cannot fit are not read.

@@ -82,7 +82,8 @@ class Chart {
     const ticks = facts.logarithmic ? powerTicks(low, high, 5) : roundTicks(low / by, high / by, 5).map((y) => y * by);
     for (const y of ticks) {
       parts.push(element("line", { class: "grid", x1: left, x2: wide - right, y1: this.y(y), y2: this.y(y) }));
-      text(left - 6, this.y(y) + 4, number(y / by, 5), { "text-anchor": "end" });
+      const power = facts.logarithmic && Math.log10(y) % 1 === 0 ? raised(`10^${Math.log10(y)}`) : number(y / by, 5);
+      text(left - 6, this.y(y) + 4, power, { "text-anchor": "end" });
     }
     text((left + wide - right) / 2, HEIGHT - 6, `time (${timeUnit})`, { "text-anchor": "middle" });
     if (unit) text(14, (HEIGHT - bottom + top) / 2, unit, { "text-anchor": "middle", transform: `rotate(-90 14 ${(HEIGHT - bottom + top) / 2})` });

@@ -157,12 +157,12 @@ class Player {
       group("Playback", element("div", { class: "transport" },
         button(icon("M4 3h2v10H4z M13 3v10L7 8z"), "First frame", () => { this.play(false); this.go(0); }), this.playButton, this.slider, this.clock), rate.label),
       element("details", { class: "settings", open: innerWidth > 700 }, element("summary", {}, "Colours, sizes, cut, view, downloads"),
-        group("Colours", this.colour.label, this.maps.label, range),
+        element("div", { class: "columns" }, group("Colours", this.colour.label, this.maps.label, range),
         group("Sizes", sizes.label, element("label", {}, element("span", {}, "Scale"), scale), element("label", {}, element("span", {}, "Particle id"), search)),
         group("Clipping plane", this.cutAxis.label, this.cutPlace),
         group("View", ...shown, element("span", { class: "buttons" }, ...views, button("all", "Show all", () => this.home()))),
         group("Downloads", button("PNG of the view", "Save the view as PNG", () => this.png()),
-          button("CSV of this frame", "Save the particles of this frame as CSV", () => this.csv()))),
+          button("CSV of this frame", "Save the particles of this frame as CSV", () => this.csv())))),
       this.live);
     if (last < 1) this.slider.disabled = true;
   }
