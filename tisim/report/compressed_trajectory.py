@@ -1,7 +1,7 @@
 """A run as a browser plays it: the frames of a trajectory, rounded and compressed.
 
 A particle has a row in every frame from the first to the last in which it exists. A row is used again by a
-later particle, so that there are about as many rows as particles exist at once. The column ``id`` has the id
+later particle, so that the number of rows is about the largest number of particles at one time. The column ``id`` has the id
 of the particle in a row, or ABSENT.
 
 Positions are stored in bins, and shown at the middle of their bin: at most half a bin away, along each axis.
@@ -31,7 +31,7 @@ from tisim.scene.scene import Scene
 
 BINS_PER_RADIUS = 32.0
 """A bin is at most the radius of small particles over this number, or there are 2^24 bins."""
-SMALL_RADIUS = 5.0
+SMALL_PERCENTILE = 5.0
 """Percentile of the radii that counts as small."""
 EXACT_VALUES = 4_000_000
 """Up to this number of values, quantities that change are rounded to 16 bits, otherwise to 8."""
@@ -145,7 +145,7 @@ def quantities(arrays: Arrays) -> dict[str, np.ndarray]:
 
 @dataclass
 class _Survey:
-    """What a first pass over the frames has found: the row of each particle, and ranges of quantities."""
+    """The row of each particle and the ranges of quantities, from a first pass over the frames."""
 
     rows: int
     row_of: list[np.ndarray]
@@ -213,7 +213,7 @@ def _survey(frames: FrameSequence, chosen: Sequence[int], part: int) -> _Survey:
                 _extend(ranges, name, values, max(1, len(values) * len(chosen) // SAMPLED_VALUES))
     if not radii:
         low, high, corners = np.zeros(3), np.ones(3), (np.zeros(3), np.ones(3))
-    small = float(np.percentile(np.concatenate(radii), SMALL_RADIUS)) if radii else 1.0
+    small = float(np.percentile(np.concatenate(radii), SMALL_PERCENTILE)) if radii else 1.0
     common = {name: ranges[name] for name in ranges if name in (names or ())}
     return _Survey(rows, row_of, np.array(counts), low, high, corners, small, common)
 

@@ -1,6 +1,6 @@
 """The HTML of a report: a page of one file that needs no network.
 
-A policy in its head forbids the browser all connections, and all scripts and styles but those of the page,
+A policy in its head forbids the browser all connections, and all scripts and styles except the page's own,
 which it names by their hashes. Text of users is escaped; data are JSON in which "<" is written as an escape,
 so that no text ends the element that holds them.
 """
