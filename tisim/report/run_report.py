@@ -36,6 +36,8 @@ SIZE_LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
 RESERVED_BYTES = 0.25e6
 """Bytes that are reserved for everything but the recording and pictures, in characters of the page."""
+LONGEST_VALUE = 160
+"""Number of characters of a setting that are shown in the table."""
 LONGEST_TOML = 200_000
 """Number of characters from which on a scene is not shown as text."""
 CHECKS = ("case", "check", "measured", "half_interval", "expected", "allowed", "verdict")
@@ -272,6 +274,8 @@ def _part_row(role: str, name: str, summary: str, source: str) -> str:
 def _setting_row(row: Sequence[str], off: bool = False) -> str:
     """Return a setting as a row; one that leaves something out, as by default, is ``off``."""
     name, value, unit, text = row
+    if len(value) > LONGEST_VALUE:
+        value = f"{value[:LONGEST_VALUE]} ... (the scene as a file has all)"
     return (
         f'<tr{" class=off" if off else ""}><th scope="row">{escape(name)}</th>'
         f'<td class="value">{escape(value)}</td><td>{escape(superscripts(unit))}</td>'

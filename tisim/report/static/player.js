@@ -65,6 +65,7 @@ const CLASSES = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68],
   [187, 187, 187], [221, 136, 51], [110, 80, 160], [90, 150, 140], [180, 120, 90], [120, 120, 120]];
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const FRAMES_A_SECOND = 20;
+const DARK_END = 9;             // colours of a map that are left out on a dark ground
 
 const PLAY = "M4 2.5v11L14 8z", PAUSE = "M4 3h3v10H4z M9.5 3h3v10h-3z";
 
@@ -316,7 +317,9 @@ class Player {
       this.viewer.options.range = [low, high];
       this.viewer.setMap(CLASSES.slice(0, high - low + 1), true);
     } else {
-      this.viewer.setMap(this.facts.maps[this.maps.select.value]);
+      const map = this.facts.maps[this.maps.select.value], dark = map[0].every((part) => part < 100);
+      // The dark end of a map could not be seen on a dark ground.
+      this.viewer.setMap(this.viewer.options.dark && dark ? map.slice(DARK_END) : map);
     }
     this.drawLegend();
   }
@@ -496,5 +499,6 @@ class Player {
 
   theme(dark) {
     this.viewer.set({ dark });
+    this.applyMap();
   }
 }
