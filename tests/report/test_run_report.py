@@ -87,7 +87,7 @@ def test_the_page_says_what_was_asked_and_what_happened(record, tmp_path):
     assert cells("young", 3) == ["1e+07", "Pa", "Young's modulus E"]
     assert cells("acceleration", 2) == ["(0, 0, -9.80665)", "m/s\u00b2"]
     assert "unfinished" in rows
-    assert any(row.startswith("the run has come to t = 0.02 s of 1 s") for row in rows)
+    assert any(row.startswith("The run has come to t = 0.02 s of 1 s") for row in rows)
     assert asked.to_toml().strip() in text
     titles = {one["title"]: one for one in data["series"]["curves"]}
     assert set(titles) == {

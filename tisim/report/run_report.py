@@ -151,7 +151,11 @@ def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list
     """Return the state, a word for it, and sentences about it."""
     if result is None:
         reached = sequence.missing
-        return ("unfinished", "unfinished", [f"{reached}."]) if reached else ("ok", "complete", [])
+        return (
+            ("unfinished", "unfinished", [f"{reached[0].upper()}{reached[1:]}."])
+            if reached
+            else ("ok", "complete", [])
+        )
     status = result.status
     return ("ok", "ok", []) if status.ok else ("failed", "failed", [f"The run failed {status.reason}."])
 

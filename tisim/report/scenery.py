@@ -43,6 +43,12 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         centre = np.array(magnet.centre)
         focus = np.minimum(focus[0], centre - magnet.radius), np.maximum(focus[1], centre + magnet.radius)
     walls = bodies.bodies(scene, trajectory.times, travel, *focus)
+    # Walls near the particles are in view as a whole, such as the hopper above a bed.
+    size = float(np.linalg.norm(focus[1] - focus[0]))
+    near = [points for points in (body.places() for body in walls) if _within(points, focus, size)]
+    if near:
+        every = np.concatenate(near)
+        focus = np.minimum(focus[0], every.min(axis=0)), np.maximum(focus[1], every.max(axis=0))
     low, high = np.minimum(low, focus[0]), np.maximum(high, focus[1])
     for points in (*(body.places() for body in walls), *(magnet.ends() for magnet in magnets)):
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
@@ -53,6 +59,11 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         "shapes": [_shape(shape) for shape in facets.shapes_of(scene)], "gravity": gravity(scene).tolist(),
         "medianRadius": _median_radius(sequence),
     }  # fmt: skip
+
+
+def _within(points: np.ndarray, box: tuple[np.ndarray, np.ndarray], margin: float) -> bool:
+    """Return whether points (m, shape (n, 3)) are in a box or within a margin (m) of it."""
+    return bool((points >= box[0] - margin).all() and (points <= box[1] + margin).all())
 
 
 def _focus(sequence: FrameSequence, trajectory: CompressedTrajectory) -> tuple[np.ndarray, np.ndarray]:

@@ -86,7 +86,7 @@ class Player {
     this.build();
     this.listen();
     const colours = trajectory.quantities().filter((one) => !one.constant);
-    const first = ["temperature", "speed", "material", "radius"].map((name) => colours.find((one) => one.name === name)).find(Boolean);
+    const first = ["temperature", "speed", "material", "shape", "radius"].map((name) => colours.find((one) => one.name === name)).find(Boolean);
     this.colourBy((first ?? colours[0])?.name ?? "");
     this.viewer.show(0);
     new ResizeObserver(() => { this.viewer.resize(); this.overlay(); }).observe(this.canvas);

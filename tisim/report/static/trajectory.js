@@ -51,8 +51,8 @@ class Column {
     this.rows = rows;
     this.parts = facts.origin.length;
     this.largest = 2 ** facts.bits - 1;
-    this.constant = facts.step.every((step) => step === 0);
     this.exact = facts.step.every((step) => step === 1) && !facts.logarithmic;
+    this.constant = facts.step.every((step) => step === 0) || (this.exact && facts.shown?.[0] === facts.shown?.[1]);
   }
 
   /** The whole numbers of a frame. */
@@ -117,7 +117,7 @@ class Trajectory {
   /** The columns that can be shown as colours. */
   quantities() {
     return Object.values(this.columns).filter(
-      (one) => !["id", "position", "orientation", "shape"].includes(one.name));
+      (one) => !["id", "position", "orientation"].includes(one.name));
   }
 }
 
