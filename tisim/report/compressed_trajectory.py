@@ -1,8 +1,8 @@
 """A run as a browser plays it: the frames of a trajectory, rounded and compressed.
 
 A particle has a row in every frame from the first to the last in which it exists. A row is used again by a
-later particle, so that the number of rows is about the largest number of particles at one time. The column ``id`` has the id
-of the particle in a row, or ABSENT.
+later particle, so that the number of rows is about the largest number of particles at one time. The column
+``id`` has the id of the particle in a row, or ABSENT.
 
 Positions are stored in bins, and shown at the middle of their bin: at most half a bin away, along each axis.
 Along a periodic axis the side of the box is divided into 2^16 bins, so that a particle that crosses a face
