@@ -81,6 +81,23 @@ class Shaped(Effect):
         sizes: np.ndarray = start["radius"] / bounding[start[SHAPE.name].astype(int)]
         return sizes
 
+    def thicknesses(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return half the smallest extent (m) of each body of a start, shape (n,)."""
+        thickness = np.array([one.half_extents().min() for one in self.shapes()])
+        half: np.ndarray = thickness[start[SHAPE.name].astype(int)] * self.sizes(start)
+        return half
+
+    def extents(self, start: Mapping[str, np.ndarray], direction: np.ndarray) -> np.ndarray:
+        """Return how far (m) each body of a start reaches from its centre along its unit vector, shape (n, 3)
+        or (3,), shape (n,)."""
+        turns = Rotation.from_quat(start[ORIENTATION.name], scalar_first=True)
+        inside = turns.apply(direction, inverse=True)
+        extents = np.zeros(len(inside))
+        for k, shape in enumerate(self.shapes()):
+            these = start[SHAPE.name].astype(int) == k
+            extents[these] = (shape.support(inside[these]) * inside[these]).sum(axis=1)
+        return extents * self.sizes(start)
+
     @ti.func
     def size(self, s, w, i):
         """Return the size of a body over the size of its shape."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -140,6 +140,23 @@ class Walls(WallContacts, UsesMaterials, Force):
         places = position - np.array(self.motion.shift())
         deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)
         return deepest
+
+    def overlaps_of_bodies(
+        self, position: np.ndarray, extent: Callable[[np.ndarray], np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the overlap (m) of bodies with the planes of the wall at time 0, and whether their centres
+        are behind a plane, shape (n,) each.
+
+        position : centres (m), shape (n, 3). extent : returns how far (m) each body reaches from its centre
+        along a unit vector.
+        """
+        places, least = position - np.array(self.motion.shift()), np.full(len(position), np.inf)
+        overlap = np.full(len(position), -np.inf)
+        for plane in self.planes:
+            distance, normal = plane.distances(places), np.array(plane.normal)
+            least = np.minimum(least, distance)
+            overlap = np.maximum(overlap, extent(-normal / np.linalg.norm(normal)) - distance)
+        return overlap, least < 0
 
     def required_world_fields(self) -> tuple[WorldField, ...]:
         kept = self.motion.quantities.items()
