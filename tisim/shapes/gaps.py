@@ -12,6 +12,7 @@ from tisim.numerics.vectors import rotated
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.rod_pairs import closest_rods
 from tisim.shapes.superquadric_pairs import closest_superquadrics
+from tisim.shapes.superquadric_points import ELLIPSOIDS, ROD, SUPERQUADRICS, WITH_RODS
 
 
 def gaps(
@@ -26,33 +27,48 @@ def gaps(
     """Return the gap (m, negative if the bodies overlap, shape (m,)) and the unit normal from the first to
     the second body (shape (m, 3)) of each pair.
 
-    shapes : all rods or spheres, or all superquadrics, ellipsoids or spheres. shape : index of the shape of
-    each body. scale : size of each body over the size of its shape. orientation : unit quaternions w, x, y, z
-    of the bodies, shape (n, 4). pairs : indices of two bodies, shape (m, 2). separation : centre of the
-    second minus centre of the first (m), shape (m, 3). far : gap (m) beyond which a lower bound of the gap
-    and a normal that separates the bodies are sufficient.
+    shapes : rods, spheres, superquadrics and ellipsoids. shape : index of the shape of each body. scale :
+    size of each body over the size of its shape. orientation : unit quaternions w, x, y, z of the bodies,
+    shape (n, 4). pairs : indices of two bodies, shape (m, 2). separation : centre of the second minus centre
+    of the first (m), shape (m, 3). far : gap (m) beyond which a lower bound of the gap and a normal that
+    separates the bodies are sufficient.
 
-    Gaps of rods and spheres are in closed form; others are found by Newton's method.
+    Gaps of two rods or spheres are in closed form; others are found by Newton's method.
     """
     out = np.zeros((len(pairs), 4))
-    rods = [one.rod() for one in shapes]
-    superquadrics = [one.superquadric() for one in shapes]
-    kinds = ", ".join(sorted({type(one).__name__ for one in shapes}))
-    known = None not in rods or None not in superquadrics
-    must(known, "shapes", "all rods or spheres, or all superquadrics, ellipsoids or spheres", kinds)
-    if not len(pairs):
-        return out[:, 0], out[:, 1:]
-    first, second = (np.ascontiguousarray(one, np.int32) for one in np.transpose(pairs))
-    where = (np.ascontiguousarray(separation, float), first, second, np.ascontiguousarray(orientation, float))
+    rods = np.array([one.rod() or (-1.0, 0.0) for one in shapes]).reshape(-1, 2)
+    round_ends = (rods[:, 0] >= 0)[shape]
+    quick = round_ends[pairs].all(axis=1)
+    turns, apart = np.ascontiguousarray(orientation, float), np.asarray(separation, float)
     runtime.current()
-    if None not in rods:
-        sizes = np.array([one for one in rods if one], float).reshape(-1, 2)
-        _rods(*where, sizes[shape] * scale[:, None], out)
-    else:
-        axes, exponents = (np.array([one[k] for one in superquadrics if one], float) for k in (0, 1))
-        sizes, powers = axes[shape] * scale[:, None], exponents[shape]
-        _superquadrics(bool((exponents == 2).all()), *where, sizes, powers, float(far), out)
+    for chosen, closed in ((quick, True), (~quick, False)):
+        if not chosen.any():
+            continue
+        first, second = (np.ascontiguousarray(one, np.int32) for one in pairs[chosen].T)
+        where, some = (np.ascontiguousarray(apart[chosen]), first, second, turns), np.zeros((len(first), 4))
+        if closed:
+            _rods(*where, rods[shape] * scale[:, None], some)
+        else:
+            family, axes, exponents = _as_superquadrics(shapes)
+            sizes, powers = axes[shape] * scale[:, None], exponents[shape]
+            _superquadrics(family, *where, sizes, powers, float(far), some)
+        out[chosen] = some
     return out[:, 0], out[:, 1:]
+
+
+def _as_superquadrics(shapes: Sequence[ParticleShape]) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return the family of some shapes, and their semi-axes (m) and exponents, shape (k, 3) each."""
+    sizes = []
+    for shape in shapes:
+        given, rod = shape.superquadric(), shape.rod()
+        if given is None and rod is not None:
+            half, radius = rod
+            given = (radius, radius, half + radius), (2.0, 2.0, ROD)
+        must(given is not None, "shapes", "rods, spheres, superquadrics and ellipsoids", type(shape).__name__)
+        sizes.append(given)
+    axes, exponents = np.swapaxes(np.array(sizes, float), 0, 1)
+    family = WITH_RODS if (exponents == ROD).any() else SUPERQUADRICS
+    return ELLIPSOIDS if (exponents == 2).all() else family, axes, exponents
 
 
 @ti.func
@@ -91,7 +107,7 @@ def _rods(
 @in_taichi_thread
 @ti.kernel
 def _superquadrics(
-    ellipsoids: ti.template(),  # type: ignore[valid-type]
+    family: ti.template(),  # type: ignore[valid-type]
     separation: ti.types.ndarray(),  # type: ignore[valid-type]
     first: ti.types.ndarray(),  # type: ignore[valid-type]
     second: ti.types.ndarray(),  # type: ignore[valid-type]
@@ -106,6 +122,6 @@ def _superquadrics(
         here = _row(q, i, 4), _row(axes, i, 3), _row(exponents, i, 3)
         there = _row(q, j, 4), _row(axes, j, 3), _row(exponents, j, 3)
         gap, normal, _x, _y = closest_superquadrics(
-            ellipsoids, _row(separation, m, 3), here[0], here[1], here[2], there[0], there[1], there[2], far
+            family, _row(separation, m, 3), here[0], here[1], here[2], there[0], there[1], there[2], far
         )
         _write(out, m, gap, normal)

@@ -65,7 +65,7 @@ def material(**changes):
     return {"grain": Material(**{**USUAL, **changes})}
 
 
-def colliding(shape, law=ELASTIC, dt=1e-6, time=4e-3, **changes):
+def colliding(body, law=ELASTIC, dt=1e-6, time=4e-3, **changes):
     """Two bodies that run into each other off centre, spinning."""
     given = {
         "velocity": [(0.3, 0.02, 0), (-0.3, 0.01, 0.05)],
@@ -75,7 +75,7 @@ def colliding(shape, law=ELASTIC, dt=1e-6, time=4e-3, **changes):
     }
     place = [(-1.5e-3, 0, 0), (1.5e-3, 0.3e-3, 0.2e-3)]
     more = {"materials": material(), **given}
-    return moving(shape, place, (law,), dt, round(time / dt), **more)
+    return moving(body, place, (law,), dt, round(time / dt), **more)
 
 
 def top(shape, spin, dt, steps):

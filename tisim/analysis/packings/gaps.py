@@ -30,8 +30,7 @@ def near_gaps(packing: PackedBodies, reach: float) -> Gaps:
     too.
 
     Pairs whose bounding spheres are that near are found by a k-d tree, and their gaps by the kernels of the
-    engine: in closed form for spheres and rods, by Newton's method for superquadrics. All shapes of a packing
-    must be rods or spheres, or all superquadrics, ellipsoids or spheres.
+    engine: in closed form for spheres and rods, by Newton's method if one of them is a superquadric.
     """
     i, j, separation = _candidates(packing, reach)
     pairs, bodies = np.column_stack([i, j]), (packing.shape, packing.scale, packing.orientation)
