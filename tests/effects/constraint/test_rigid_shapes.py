@@ -420,7 +420,7 @@ REFUSED = {
     "drag": ({"effects": (StokesDrag(viscosity=1.0),)}, "effects.stokes_drag must be a law for bodies"),
     "a disc": (
         {"effects": (LAW, Walls(discs=[Disc(normal=(0, 0, 1), radius=0.1)]))},
-        "effects.walls must be made of planes, with effects.rigid_rods; received 'discs'",
+        "effects.walls must be made of planes, spheres, and open cylinders and cones, with effects.rigid",
     ),
     "no such shape": ({"shape": 1}, "particles.shape must be indices of the 1 shapes"),
     "prescribed motion": (

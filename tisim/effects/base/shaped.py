@@ -87,16 +87,17 @@ class Shaped(Effect):
         half: np.ndarray = thickness[start[SHAPE.name].astype(int)] * self.sizes(start)
         return half
 
-    def extents(self, start: Mapping[str, np.ndarray], direction: np.ndarray) -> np.ndarray:
-        """Return how far (m) each body of a start reaches from its centre along its unit vector, shape (n, 3)
-        or (3,), shape (n,)."""
+    def farthest_points(self, start: Mapping[str, np.ndarray], direction: np.ndarray) -> np.ndarray:
+        """Return the points (m) of the bodies of a start that are farthest along their unit vectors, relative
+        to their centres, shape (n, 3). direction : one for each, shape (n, 3), or one for all."""
         turns = Rotation.from_quat(start[ORIENTATION.name], scalar_first=True)
         inside = turns.apply(direction, inverse=True)
-        extents = np.zeros(len(inside))
+        points = np.zeros((len(start["mass"]), 3))
         for k, shape in enumerate(self.shapes()):
             these = start[SHAPE.name].astype(int) == k
-            extents[these] = (shape.support(inside[these]) * inside[these]).sum(axis=1)
-        return extents * self.sizes(start)
+            points[these] = shape.support(inside[these])
+        farthest: np.ndarray = turns.apply(points * self.sizes(start)[:, None])
+        return farthest
 
     @ti.func
     def size(self, s, w, i):
@@ -132,3 +133,13 @@ class Shaped(Effect):
         q_i, q_j = self.turn(s, w, i), self.turn(s, w, j)
         found, _normal, _here, _there = self.between(s, w, i, j, q_i, q_j, separation, gap)
         return found > gap
+
+    @ti.func
+    def beside_rod(self, s, w, i, q, separation, axis, half, radius):
+        """Return the gap (m) between a body and a rod, the unit normal from the body to the rod, and the
+        point of contact of the body (m), relative to its centre.
+
+        q : orientation of the body. separation : centre of the rod minus centre of the body (m). axis : unit
+        vector along the rod; 0 for a sphere. half : half the length of its segment (m). radius : m.
+        """
+        return separation[0], separation, separation

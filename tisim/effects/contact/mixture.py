@@ -74,3 +74,12 @@ class Mixture(Rods, Superquadrics):
         else:
             gap, normal, here, there = Superquadrics.between(self, s, w, i, j, q_i, q_j, separation, far)
         return gap, normal, here, there
+
+    @ti.func
+    def beside_rod(self, s, w, i, q, separation, axis, half, radius):
+        gap, normal, here = 0.0 * separation[0], 0.0 * separation, 0.0 * separation
+        if self.is_rod(s, w, i):
+            gap, normal, here = Rods.beside_rod(self, s, w, i, q, separation, axis, half, radius)
+        else:
+            gap, normal, here = Superquadrics.beside_rod(self, s, w, i, q, separation, axis, half, radius)
+        return gap, normal, here

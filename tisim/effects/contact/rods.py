@@ -57,3 +57,9 @@ class Rods(Shaped):
             self.half(s, w, j),
             self.rod_radius(s, w, j),
         )
+
+    @ti.func
+    def beside_rod(self, s, w, i, q, separation, axis, half, radius):
+        own = self.axis(q), self.half(s, w, i), self.rod_radius(s, w, i)
+        gap, normal, here, _there = closest_rods(separation, own[0], own[1], own[2], axis, half, radius)
+        return gap, normal, here

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Shaped
-from tisim.numerics.vectors import conjugate, rotated
+from tisim.numerics.vectors import conjugate, rotated, turn_between
 from tisim.shapes.particle_shape import ParticleShape
 from tisim.shapes.superquadric import SuperquadricShape
 from tisim.shapes.superquadric_pairs import closest_superquadrics
-from tisim.shapes.superquadric_points import ELLIPSOIDS, SUPERQUADRICS, farthest_point
+from tisim.shapes.superquadric_points import ELLIPSOIDS, ROD, SUPERQUADRICS, WITH_RODS, farthest_point
 
 
 class Superquadrics(Shaped):
@@ -80,3 +80,21 @@ class Superquadrics(Shaped):
         inside = ti.cast(rotated(conjugate(q), direction), ti.f64)
         a, g = self.semi_axes(s, w, i), self.exponents(s, w, i)
         return rotated(q, ti.cast(farthest_point(self.family, inside, a, g), s.real))
+
+    @ti.func
+    def beside_rod(self, s, w, i, q, separation, axis, half, radius):
+        zero = 0.0 * separation[0]
+        z = ti.Vector([zero, zero, zero + 1.0])
+        turn = turn_between(z, ti.select(axis.norm_sqr() > 0.0, axis, z))
+        gap, normal, here, _there = closest_superquadrics(
+            WITH_RODS,
+            ti.cast(separation, ti.f64),
+            q,
+            self.semi_axes(s, w, i),
+            self.exponents(s, w, i),
+            turn,
+            ti.Vector([radius, radius, half + radius]),
+            ti.Vector([zero + 2.0, zero + 2.0, zero + ROD]),
+            ti.math.inf,
+        )
+        return ti.cast(gap, s.real), ti.cast(normal, s.real), ti.cast(here, s.real)
