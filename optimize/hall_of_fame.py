@@ -82,13 +82,13 @@ def reported(individual: Individual) -> tuple[float, ...]:
 
 
 def not_dominated(front: Sequence[Individual]) -> list[Individual]:
-    """Return the designs of a front that no other dominates by reported costs, in order."""
+    """Return the designs of a front that no other dominates, sorted by the first cost; costs as reported."""
     costs = np.array([reported(individual) for individual in front])
     no_better = np.all(costs[:, None] >= costs[None], axis=2)
     worse = np.any(costs[:, None] > costs[None], axis=2)
-    return [
-        individual for individual, out in zip(front, (no_better & worse).any(axis=1), strict=True) if not out
-    ]
+    dominated = (no_better & worse).any(axis=1)
+    kept = [individual for individual, out in zip(front, dominated, strict=True) if not out]
+    return sorted(kept, key=reported)
 
 
 def compromise(front: Sequence[Individual]) -> Individual:

@@ -72,7 +72,7 @@ def static(size: str) -> Figure:
     radii = np.array([[free_radius(one, t) for t in TIMES] for one in mutual])
     band(middle, TIMES, radii, BLUE, "matrix")
     middle.plot(WAITS, [3.0] * len(WAITS), "s", color="0.4", ms=5, label="B16, about 3 nm")
-    middle.set(xlabel="time (s)", ylabel="mean magnetic radius of the free (nm)", ylim=(0, None))
+    middle.set(xlabel="time (s)", ylabel="mean radius of the free (nm)", ylim=(0, None))
     middle.legend(frameon=False, fontsize=8)
     radius = np.concatenate([one.state["radius"] for one in mutual])
     for wait, colour in zip(WAITS, (GREEN, BLUE, PURPLE), strict=True):

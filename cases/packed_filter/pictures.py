@@ -59,10 +59,13 @@ def draw_filter(
     low, high = matrix_box(scene)
     magnets = next(one for one in scene.effects if isinstance(one, MagneticCylinders)).cylinders
     centre = np.array([one.centre for one in magnets])
-    own = np.all((centre >= low) & (centre <= high), axis=1)
-    fibres = [one for k, one in enumerate(magnets) if own[k]]
-    unit, norm = 2 * fibres[0].radius, Normalize(0.0, end)
     held = state["captured_by"] >= 0
+    # Images of fibres are drawn if they hold colloids.
+    own = np.all((centre >= low) & (centre <= high), axis=1)
+    own[state["captured_by"][held]] = True
+    fibres = [one for k, one in enumerate(magnets) if own[k]]
+    latest = state["captured_at"].max(initial=0.0)
+    unit, norm = 2 * fibres[0].radius, Normalize(0.0, latest if latest > 0 else end)
     lines = streamlines(scene, unit)
     middle, along = (lines[1:] + lines[:-1]) / 2, lines[1:] - lines[:-1]
     shapes = (

@@ -59,11 +59,11 @@ MEANINGS = {
     "speed": "superficial velocity of the water",
 }
 SEARCHED: dict[str, dict[str, Any]] = {
-    "small": {"number": 100, "cells": (24, 24, 48)},
+    "small": {"number": 100, "cells": (24, 24, 48), "digits": None},
     "default": {"number": 300, "cells": (36, 36, 72)},
 }
-"""Colloids of a run and cells of its flow, by size. All designs have the same, so that a generation is one
-batch."""
+"""Colloids of a run, cells of its flow and the sum of its field, by size. All designs have the same, so that
+they are run as batches. An octree for each design does not pay for 100 colloids."""
 FEWEST_FIBRES = 30
 """Least number of fibres of a design."""
 TRANSITS = 4.0
@@ -83,7 +83,6 @@ def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedF
         flux=design["flux"],
         speed=speed,
         feed=0.1 * transit,
-        digits=2,
         duration=TRANSITS * transit,
         **settings,
     )

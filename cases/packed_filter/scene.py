@@ -36,6 +36,7 @@ from tisim.packing import GrainClass, LognormalSizes, MagneticCore
 from tisim.packing.grains import draw
 from tisim.packing.magnetic_core import core_normals
 from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow, UniformFlow, magnetise
+from tisim.sources.magnetic.cell_sum import Corners
 from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.sources.switched import NO_END
 from tisim.steppers import Brownian, DriftLimit
@@ -56,7 +57,7 @@ IMAGE_REACH = 1.0
 LONGEST_MOVE = 0.05
 """Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D."""
 FIELD_DIGITS = 2
-"""Number of digits of the field; random motion outweighs this error."""
+"""Number of digits of the field, or of the table of a fibre; random motion outweighs this error."""
 APPROACH = 1.0
 """Distance of the faces at which colloids enter and leave from the matrix, in lengths of a fibre."""
 ADHERING = 0.4
@@ -93,12 +94,13 @@ class PackedFilter:
     """A filter and the suspension in it.
 
     matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
-    magnetise each other. digits : of the sum of their fields. speed : superficial velocity of the water, the
-    volume flow over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform"
-    with the mean velocity in the pores. resolution : cells of the resolved flow over D, unless ``cells``
-    along x, y and z are given. feed : time until which colloids enter, s. field_end : time at which the field
-    is switched off, s. adhering : fraction of captured colloids that are never released; None for captures
-    that last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
+    magnetise each other. digits : of the sum of their fields by cells; None to add the fibres one by one,
+    from a table, which is faster for few colloids. speed : superficial velocity of the water, the volume flow
+    over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform" with the
+    mean velocity in the pores. resolution : cells of the resolved flow over D, unless ``cells`` along x, y
+    and z are given. feed : time until which colloids enter, s. field_end : time at which the field is
+    switched off, s. adhering : fraction of captured colloids that are never released; None for captures that
+    last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
     duration : of the run, s.
     """
 
@@ -106,7 +108,7 @@ class PackedFilter:
     mode: Mode = "static"
     flux: float = 1.0
     mutual: bool = True
-    digits: int = FIELD_DIGITS
+    digits: int | None = FIELD_DIGITS
     speed: float = 1e-4
     flow: Flow = "resolved"
     resolution: float = 5.0
@@ -191,6 +193,8 @@ class PackedFilter:
                 MagneticCylinders(
                     cylinders=magnets,
                     sum_digits=self.digits,
+                    table_digits=FIELD_DIGITS if self.digits is None else None,
+                    sum_box=self.stretch(box),
                     end=self.field_end,
                 ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
@@ -207,9 +211,8 @@ class PackedFilter:
         """Return the flow, and the faces before and behind a box at which colloids enter and leave."""
         if self.mode == "static":
             return ()
-        before = APPROACH * self.matrix.length
-        (left, front, bottom), (right, back, top) = box.low, box.high
-        first, entry, last = bottom - before - self.matrix.diameter, bottom - before, top + before
+        (left, front, first), (right, back, last) = self.stretch(box)
+        entry = first + self.matrix.diameter
         flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed))
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
@@ -229,6 +232,15 @@ class PackedFilter:
             ),
             Outlet(planes=(Plane(point=(0.0, 0.0, last), normal=(0.0, 0.0, -1.0)),)),
         )
+
+    def stretch(self, box: Box) -> Corners:
+        """Return the corners (m) of the box in which colloids are: the box of the matrix, from the beginning
+        of the inlet to the outlet if there is a flow."""
+        (left, front, bottom), (right, back, top) = box.low, box.high
+        if self.mode == "dynamic":
+            before = APPROACH * self.matrix.length
+            bottom, top = bottom - before - self.matrix.diameter, top + before
+        return (left, front, bottom), (right, back, top)
 
     def release(self) -> Release | None:
         """Return the conditions under which captured colloids are released."""

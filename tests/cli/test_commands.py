@@ -8,6 +8,7 @@ import pytest
 from tisim.analysis import Mean
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Check, Claim, Shown
+from tisim.errors import RunError
 from tisim.scene.scene import PHYSICS_VERSION
 
 
@@ -46,6 +47,18 @@ def test_check_detects_failures(tisim, monkeypatch):
     assert err.strip().endswith("2 of 3 checks failed")
     checks[1:] = []
     assert tisim("check", "toy")[0] == 0
+
+
+def test_checks_before_a_failed_run_are_printed(tisim, monkeypatch):
+    def check():
+        yield Check("one", 1.0, 1.0, 0.0)
+        raise RunError("a run failed")
+
+    case = Case("toy", "A toy", "", {}, lambda size, seed: None, check)
+    monkeypatch.setattr(catalogue, "every", lambda: {"toy": case})
+    code, out, err = tisim("check", "toy")
+    assert (code, out.splitlines()[1].split()) == (1, ["one", "1", "1", "0.0e+00", "0.0e+00", "pass"])
+    assert err.splitlines() == ["checked: one", "a run failed"]
 
 
 def test_check_writes_what_it_prints(tisim, monkeypatch, tmp_path):

@@ -117,7 +117,7 @@ def test_several_objectives_give_a_front(tmp_path):
     front = optimize.run(
         replace(problem("default", ""), objective=two), generations=1, options={"population": 8}
     )
-    assert front.settings.method == "nsga2"
+    assert front.settings.method == "genetic"
     heights = [design.values["height"] for design in front.designs]
     assert [design.values["R"] for design in front.designs] == sorted(d.values["R"] for d in front.designs)
     assert heights == sorted(heights)

@@ -12,7 +12,7 @@ from tests.optimize.fake_runs import FakeEvaluator, fake_problem, fake_record
 from tisim import InputError
 from tisim.optimize.evaluation.ensemble_settings import EnsembleSettings
 from tisim.optimize.evaluation.estimate import FitnessEstimate
-from tisim.optimize.hall_of_fame import HallOfFame, compromise
+from tisim.optimize.hall_of_fame import HallOfFame, compromise, not_dominated
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.objective import Objective
@@ -90,6 +90,16 @@ def test_compromise_is_nearest_to_the_best_of_each():
         front[-1].fitness.values = costs
     assert compromise(front) is front[1]
     assert compromise(front[:1]) is front[0]
+
+
+def test_a_confirmed_front_is_sorted_by_its_means_over_held_out_starts():
+    """Of costs (1, 3), (2, 2), (3, 1) the first is worse than it seemed, and the last is dominated."""
+    front = []
+    for first, confirmed in ((1.0, (2.5, 1.5)), (2.0, (2.0, 2.0)), (3.0, (3.0, 1.6))):
+        front.append(Individual((first,), 2))
+        front[-1].fitness.values = (first, 4.0 - first)
+        front[-1].confirmed = tuple(FitnessEstimate(c, 0.1, c, c, 4, True, "") for c in confirmed)
+    assert not_dominated(front) == [front[1], front[0]]
 
 
 def test_hall_of_one_objective_keeps_the_best_different_ones():
@@ -192,10 +202,10 @@ def test_a_resumed_search_is_the_same(path, tmp_path):
         return zdt1(design, seed, noise=0.02)
 
     whole = run(tmp_path / "whole.h5", noisy, **settings)
-    part = run(path, evaluator=FakeEvaluator(noisy, interrupt_after=300), **settings)
+    part = run(path, evaluator=FakeEvaluator(noisy, interrupt_after=200), **settings)
     assert part.interrupted
     again = run(path, noisy, **settings)
-    assert again.evaluations == whole.evaluations - 300
+    assert again.evaluations == whole.evaluations - 200
     assert [(list(one), repr(one.estimates), repr(one.confirmed)) for one in again.hall] == [
         (list(one), repr(one.estimates), repr(one.confirmed)) for one in whole.hall
     ]

@@ -71,12 +71,18 @@ def check(
     runtime.init(device, precision, threads, arithmetic)
     table = plain_table("check", "measured", "expected", "off by", "allowed", "")
     done: list[Check | Claim | Shown] = []
-    with err().status("checking") as status:
-        for item in checks:
-            done.append(item)
-            table.add_row(item.name, *item.cells, Text(VERDICTS[_ok(item)], VERDICT_STYLES[_ok(item)]))
-            status.update(f"checked: {item.name}")
-    out().print(table)
+    try:
+        with err().status("checking") as status:
+            for item in checks:
+                done.append(item)
+                table.add_row(item.name, *item.cells, Text(VERDICTS[_ok(item)], VERDICT_STYLES[_ok(item)]))
+                status.update(f"checked: {item.name}")
+                if not err().is_terminal:
+                    err().print(f"checked: {item.name}")
+    finally:
+        # Also if a later check fails or is interrupted.
+        if done:
+            out().print(table)
     if file is not None:
         replace_file(file, _csv(chosen.name, done).encode())
     outcomes = [_ok(item) for item in done]

@@ -98,28 +98,42 @@ class Capture(TouchingMagnets):
     def particle(self, s, w, i, t, dt):
         r, radius = s.position[w, i], s.radius[w, i]
         clear = ti.max(SURE * (s.clearance[w, i] - radius), 0.0)
-        if s.fixed[w, i] == 0 and not ((r - s.cleared_from[w, i]).norm_sqr() < clear * clear):
-            by, distance, outward = self.touched(w, r, radius)
+        by, outward, free = -1, 0.0 * r, s.fixed[w, i] == 0
+        if free and not ((r - s.cleared_from[w, i]).norm_sqr() < clear * clear):
+            touched, distance, away = self.touched(w, r, radius)
             s.clearance[w, i], s.cleared_from[w, i] = distance, r
-            if by >= 0:
+            if touched >= 0:
+                by, outward = touched, away
                 s.position[w, i] = r + (radius - distance) * outward
-                if self.holds(s, w, i, t, outward):
-                    self.capture(s, w, i, by, t)
-                else:
-                    inward = ti.min(s.velocity[w, i].dot(outward), 0.0)
-                    s.velocity[w, i] -= inward * outward
+        if self.may_come_off(s, w, i, t):
+            by = s.captured_by[w, i]
+            outward = self.outward(w, by, r)
+        if by >= 0:
+            # One call, as the laws of a scene may take long to compile.
+            holds = self.holds(s, w, i, t, outward)
+            if free and holds:
+                self.capture(s, w, i, by, t)
+            elif free:
+                inward = ti.min(s.velocity[w, i].dot(outward), 0.0)
+                s.velocity[w, i] -= inward * outward
+            elif not holds:
+                self.let_go(s, w, i, t)
+
+    @ti.func
+    def may_come_off(self, s, w, i, t):
+        """Return whether particle i was captured in an earlier step and does not adhere."""
+        may = False
         if ti.static(self.releases):
-            self.let_go(s, w, i, t)
+            may = s.captured_by[w, i] >= 0 and s.adheres[w, i] == 0 and s.captured_at[w, i] < t
+        return may
 
     @ti.func
     def let_go(self, s, w, i, t):
-        """Release particle i if it was captured in an earlier step and nothing holds it any more."""
-        if s.captured_by[w, i] >= 0 and s.adheres[w, i] == 0 and s.captured_at[w, i] < t:
-            outward = self.outward(w, s.captured_by[w, i], s.position[w, i])
-            if not self.holds(s, w, i, t, outward):
-                s.fixed[w, i], s.captured_by[w, i], s.captured_at[w, i] = 0, -1, -1.0
-                s.released_at[w, i] = ti.cast(t, s.real)
-                ti.atomic_add(s.releases[w], 1)
+        """Release particle i."""
+        if ti.static(self.releases):
+            s.fixed[w, i], s.captured_by[w, i], s.captured_at[w, i] = 0, -1, -1.0
+            s.released_at[w, i] = ti.cast(t, s.real)
+            ti.atomic_add(s.releases[w], 1)
 
     @ti.func
     def capture(self, s, w, i, by, t):

@@ -194,7 +194,7 @@ def test_a_rod_of_length_0_in_a_turning_drum_is_a_sphere():
     """With friction and rolling resistance; the difference is of first order in dt."""
     drum = Walls(
         cylinders=[CylindricalSurface(start=(0, -FAR, 0), end=(0, FAR, 0), radius=R)],
-        motion=Turning(axis=(0, 1, 0), angular_velocity=20.0),
+        motion=Turning(rate=(0, 20.0, 0)),
     )
     place, errors = [(1e-3, 0, -4.99 * D)], []
     for dt, steps in ((2e-6, 8000), (1e-6, 16_000)):

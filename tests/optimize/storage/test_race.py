@@ -113,19 +113,22 @@ def noisy_bowl(design, seed):
 
 
 @pytest.mark.slow
-def test_search_with_races_finds_better_designs_at_equal_evaluations():
-    """Compared are the true costs of the best of 12 searches of 400 runs, and the errors of the claimed
-    costs."""
-    true, claimed = {}, {}
+def test_races_make_the_claimed_cost_less_biased_at_equal_evaluations():
+    """Compared are the claimed and the true costs of the best of 24 searches of 400 runs each. The true costs
+    are alike with and without races (docs/inverse_design.md)."""
+    bias = {}
     for race in (0, 16):
         starts = EnsembleSettings(min_starts=2, block=2, max_starts=40, tolerance=0.9, race=race)
-        best = []
-        for seed in range(12):
-            settings = Settings(seed=seed, generations=99, max_evaluations=400, ensemble=starts)
+        errors = []
+        for seed in range(24):
+            settings = Settings(
+                seed=seed, method="nsga2", generations=99, max_evaluations=400, ensemble=starts
+            )
             outcome = search(fake_problem(3), FakeEvaluator(noisy_bowl), FakeCache(), settings)
-            assert 398 <= outcome.evaluations <= 400
-            best.append(outcome.best)
-        true[race] = np.sum((np.array(best) - 0.3) ** 2, axis=1)
-        claimed[race] = np.mean([individual.estimates[0].mean for individual in best])
-    assert np.mean(true[16]) < 0.7 * np.mean(true[0])
-    assert abs(claimed[16]) < 0.8 * abs(claimed[0])
+            # Less than a block and a half of starts is left over.
+            assert 397 <= outcome.evaluations <= 400
+            true = np.sum((np.array(outcome.best) - 0.3) ** 2)
+            errors.append(outcome.hall[0].estimates[0].mean - true)
+        bias[race] = np.mean(errors)
+    assert bias[0] < -0.05, "the best of noisy values"
+    assert abs(bias[16]) < 0.5 * abs(bias[0])

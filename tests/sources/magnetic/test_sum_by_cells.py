@@ -233,3 +233,33 @@ def test_particles_touch_the_same_cylinders_as_without_cells(rng):
     assert (found[0].state["captured_by"] % 3 == 0).any()
     for name in ("captured_by", "position"):
         np.testing.assert_array_equal(found[1].state[name], found[0].state[name])
+
+
+@pytest.mark.long
+def test_a_sum_in_a_box(rng):
+    """In the box the sum has its accuracy, with fewer cells; outside of the cube about it, fibres are added
+    one by one. Worlds may differ in the box."""
+    cylinders = fibres(rng, 25)
+    box = ((-0.3 * SIDE, -0.2 * SIDE, 0.0), (0.2 * SIDE, 0.2 * SIDE, 0.4 * SIDE))
+    low, high = np.array(box)
+    ways = {"sum_digits": 3, "sum_box": box}
+    size = cell_sum._typical(cylinder_rows.rows(cylinders), low, high)
+    inside = rng.uniform(low, high, (400, 3))
+    direct, by_cells = MagneticCylinders(cylinders=cylinders), MagneticCylinders(cylinders=cylinders, **ways)
+    expected, found = (sample([one], one.quantity, inside) for one in (direct, by_cells))
+    for a, b, one in zip(found, expected, size, strict=True):
+        wrong = np.linalg.norm((a - b).reshape(len(inside), -1), axis=1).max()
+        assert 1e-6 * one < wrong < 1e-3 * one
+    beyond = 0.5 * (low + high) + 0.26 * SIDE * np.sign(rng.normal(size=(100, 3)))
+    expected, found = (sample([one], one.quantity, beyond)[0] for one in (direct, by_cells))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * size[0])
+    whole = cell_sum.cell_row(cylinders, 3)
+    assert len(whole) == len(cell_sum.cell_row(cylinders, 3, box))
+    assert np.count_nonzero(cell_sum.cell_row(cylinders, 3, box)) < 0.7 * np.count_nonzero(whole)
+    other = MagneticCylinders(cylinders=cylinders, sum_digits=3, sum_box=((0, 0, 0), (SIDE, SIDE, SIDE)))
+    assert by_cells.structure() == other.structure() != direct.structure()
+
+
+def test_a_box_without_extent_is_refused(rng):
+    with pytest.raises(InputError, match="magnetic_cylinders.sum_box must be a lower and an upper corner"):
+        MagneticCylinders(cylinders=fibres(rng, 2), sum_digits=3, sum_box=((0, 0, 0), (1e-3, 0, 1e-3)))

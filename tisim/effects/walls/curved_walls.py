@@ -199,13 +199,14 @@ class CurvedWalls:
             shift = ti.select(start == 0, 0.0, ti.select(start < 3, sign, 0.0)) * aside
             shift += ti.select(start > 2, sign, 0.0 * sign) * other
             n = self.tangent(place + shift, axis, planes)
-            rounds, moving = 0, 1
+            last, y, deep, rounds, moving = n, x, 0.0 * overlap, 0, 1
             while moving == 1 and rounds < ROUNDS:
-                y = self.shapes.corner(s, w, i, corner, q, n)
-                after = self.tangent(place + y, axis, planes)
+                last, y = n, self.shapes.corner(s, w, i, corner, q, n)
                 deep = n.dot(place + y) - planes[2]
-                if deep > overlap:
-                    overlap, normal, x = deep, n, y
-                moving = ti.select((after - n).norm_sqr() > ti.static(same_direction()), 1, 0)
-                n, rounds = after, rounds + 1
+                n = self.tangent(place + y, axis, planes)
+                moving = ti.select((n - last).norm_sqr() > ti.static(same_direction()), 1, 0)
+                rounds += 1
+            # The last normal is more accurate than the depth, which is at a maximum, can tell.
+            if deep > overlap:
+                overlap, normal, x = deep, last, y
         return overlap, normal, x

@@ -15,12 +15,15 @@ import numpy as np
 
 from tisim.backend import runtime
 from tisim.backend.taichi import ti
+from tisim.components.component import Vector
 from tisim.errors import must
 from tisim.numerics import solid_harmonics
 from tisim.sources.magnetic import cylinder_rows
 from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.local_expansions import GRADIENT_ELEMENTS, Octree, design, expand, fields, gaps
 
+Corners = tuple[Vector, Vector]
+"""The lower and the upper corner of a box."""
 LEAVES_PER_CYLINDER, NEAR_PER_LEAF = 64, 12
 """Number of leaves for each cylinder that a list can hold, and of near cylinders for each leaf."""
 DEGREES = {2: 6, 3: 8, 4: 9, 5: 10}
@@ -92,24 +95,35 @@ def _errors(numbers: np.ndarray, tree: Octree, degree: int) -> tuple[float, floa
     return float(np.linalg.norm(wrong[:, :3], axis=1).max()), float(of_slope.max())
 
 
-def cell_row(cylinders: Sequence[Cylinder], digits: int) -> np.ndarray:
+def cell_row(cylinders: Sequence[Cylinder], digits: int, box: Corners | None = None) -> np.ndarray:
     """Return the packed octree for cylinders, made once for the running settings; raise InputError if it
-    cannot be as accurate as wanted."""
-    return _cell_row(tuple(cylinders), digits, runtime.current())
+    cannot be as accurate as wanted.
+
+    box : corners of the box in which the sum is wanted, m; if not given, twice the box about all cylinders.
+    """
+    return _cell_row(tuple(cylinders), digits, box, runtime.current())
 
 
 @lru_cache(maxsize=16)
-def _cell_row(cylinders: tuple[Cylinder, ...], digits: int, settings: runtime.Runtime) -> np.ndarray:
+def _cell_row(
+    cylinders: tuple[Cylinder, ...], digits: int, box: Corners | None, settings: runtime.Runtime
+) -> np.ndarray:
     sizes = _numbers(Cylinder.list_capacity(len(cylinders)))
     if not any(any(one.magnetisation) for one in cylinders):
         return _packed(None, DEGREES[digits], sizes)
     numbers, (low, high) = cylinder_rows.rows(cylinders), _region(cylinders)
+    root, most_leaves = np.array([*(0.5 * (low + high)), (high - low).max()]), sizes[1]
+    if box is not None:
+        low, high = np.array(box)
+        root = np.array([*(0.5 * (low + high)), 0.5 * (high - low).max()])
+        ends = [_region([one]) for one in cylinders]
+        there = sum(bool((first < high).all() and (last > low).all()) for first, last in ends)
+        most_leaves = LEAVES_PER_CYLINDER * max(there, 1)
     typical = np.array(_typical(numbers, low, high))
-    root = np.array([*(0.5 * (low + high)), (high - low).max()])
     part = FIRST_TOLERANCE
     for _ in range(TRIES):
         b, slope = part * 10.0**-digits * typical
-        tree = expand(cylinders, root, DEGREES[digits], (b, slope), sizes[1])
+        tree = expand(cylinders, root, DEGREES[digits], (b, slope), most_leaves)
         error = ERROR_MARGIN * float((np.array(_errors(numbers, tree, DEGREES[digits])) / typical).max())
         if error <= 10.0**-digits:
             return _packed(tree, DEGREES[digits], sizes)

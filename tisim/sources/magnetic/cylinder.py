@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option
 from tisim.errors import must
 from tisim.sources.base import add_point
-from tisim.sources.magnetic.cell_sum import CellSum, cell_row
+from tisim.sources.magnetic.cell_sum import CellSum, Corners, cell_row
 from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
@@ -55,10 +55,11 @@ class MagneticCylinders(Magnets):
     Two settings exchange accuracy for time; both errors are measured when a scene is compiled. With
     ``table_digits``, field and gradient of each cylinder are read from a table; cylinders must then be at
     least as long as their radius. With ``sum_digits``, only the cylinders near a place are added one by one,
-    and the others are summed in advance, as a harmonic polynomial in each cell of an octree. The octree is
-    twice as wide as the box about all cylinders; outside of it all cylinders are added one by one. The
-    largest error of the field, and of its gradient, is then below 10^-digits of its mean magnitude at random
-    places between the cylinders. Each world of a batch has its own octree.
+    and the others are summed in advance, as a harmonic polynomial in each cell of an octree. Outside of the
+    octree all cylinders are added one by one. It is twice as wide as the box about all cylinders, or the cube
+    about ``sum_box``: an octree of the box in which particles are takes less time to build than one that
+    also covers periodic images. The largest error of the field, and of its gradient, is below 10^-digits of
+    its mean magnitude at random places of the box. Each world of a batch has its own octree.
 
     Source: B16 Eqs (5.1), (5.3), (5.21).
     """
@@ -81,6 +82,10 @@ class MagneticCylinders(Magnets):
         ge=2,
         le=5,
     )
+    sum_box: Corners | None = option(
+        "corners of the box in which the sum is by cells, m; twice the box about all cylinders unless given",
+        None,
+    )
 
     @model_validator(mode="after")
     def _fit_for_a_table(self) -> Self:
@@ -88,6 +93,20 @@ class MagneticCylinders(Magnets):
             rule = f"at least the radius, {one.radius:g} m, with table_digits"
             must(one.length >= one.radius, f"magnetic_cylinders.cylinders.{k}.length", rule, one.length)
         return self
+
+    @model_validator(mode="after")
+    def _a_box(self) -> Self:
+        if self.sum_box is not None:
+            low, high = self.sum_box
+            rule = "a lower and an upper corner, which is above it in every component"
+            ordered = all(a < b for a, b in zip(low, high, strict=True))
+            must(ordered, "magnetic_cylinders.sum_box", rule, self.sum_box)
+        return self
+
+    def structure(self) -> tuple[Any, ...]:
+        # The box changes the numbers of the octree alone, so that worlds of a batch may differ in it.
+        alike = self if self.sum_box is None else self.model_copy(update={"sum_box": None})
+        return super(MagneticCylinders, alike).structure()
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
         if self.table_digits is not None or self.sum_digits is not None:
@@ -110,8 +129,10 @@ class MagneticCylinders(Magnets):
         return {} if self.table_digits is None else {"table": table(self.table_digits)[0]}
 
     def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
-        own = {} if self.sum_digits is None else {"cells": cell_row(self.cylinders, self.sum_digits)}
-        return {**super().derived_rows(), **own}
+        rows = dict(super().derived_rows())
+        if self.sum_digits is not None:
+            rows["cells"] = cell_row(self.cylinders, self.sum_digits, self.sum_box)
+        return rows
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         bound, digits, cells = peers.bound(self), self.table_digits, self.sum_digits

@@ -71,7 +71,7 @@ class PoreFlow(Source):
     With ``column``, the faces of the box around ``axis`` are walls: of a duct, or of a round tube that
     touches them. The velocity is 0 in walls and beyond.
 
-    Source: B16 section 7.2.2 (Darcy's law); O. Filippova, D. Haenel, ...
+    Source: B16 section 7.2.2 (Darcy's law).
     """
 
     quantity = "flow_velocity"

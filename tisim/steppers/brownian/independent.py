@@ -136,33 +136,32 @@ class IndependentBrownianSteps(PerParticle):
         elapsed, carry = start, rounding
         steps, going, g = before, 1, kick
         while elapsed < length and going > 0 and steps - before < most:
-            if self.held(w, i) > 0:
-                # It stays until the end of the interval.
-                self.end_step(w, i, begin + elapsed, length - elapsed)
-                if self.s.own_fault[w, i] == 0:
-                    elapsed = length
-                    steps += 1
-                going = self.able(w, i)
-                continue
-            # An operator may have changed the radius in the last step.
-            mobility = self.fluid.mobility(w, i)
-            if ti.static(self.forced):
-                self.force_sum.single_particle(w, i, begin + elapsed)
-            push_velocity = self.fluid.push_velocity(w, i, mobility)
-            dt, remaining = ti.cast(self.control.longest(w), ti.f64), length - elapsed
-            if not self.control.easy(self.own, w, i, push_velocity):
-                rate = self.control.rate(self.own, w, i, push_velocity)
-                dt = self.control.step(w, rate)
-                if self.control.hopeless(w, rate):
-                    self.stop(w, i, fault(rate))
-                    going = 0
+            t = begin + elapsed
+            # A fixed particle stays until the end of the interval.
+            dt, total = length - elapsed, length
+            if self.held(w, i) == 0:
+                # An operator may have changed the radius in the last step.
+                mobility = self.fluid.mobility(w, i)
+                if ti.static(self.forced):
+                    self.force_sum.single_particle(w, i, t)
+                push_velocity = self.fluid.push_velocity(w, i, mobility)
+                remaining = dt
+                dt = ti.cast(self.control.longest(w), ti.f64)
+                if not self.control.easy(self.own, w, i, push_velocity):
+                    rate = self.control.rate(self.own, w, i, push_velocity)
+                    dt = self.control.step(w, rate)
+                    if self.control.hopeless(w, rate):
+                        self.stop(w, i, fault(rate))
+                        going = 0
+                if going > 0:
+                    total, carry = compensated_sum(elapsed, dt, carry, self.s.count[w])
+                    if dt * (1.0 + LITTLE) >= remaining:
+                        dt, total = remaining, length
+                    if steps > 0:
+                        g = self.fluid.normals(w, i, self.number(interval) + steps)
+                    self.move(w, i, mobility, push_velocity, t, dt, g)
             if going > 0:
-                total, carry = compensated_sum(elapsed, dt, carry, self.s.count[w])
-                if dt * (1.0 + LITTLE) >= remaining:
-                    dt, total = remaining, length
-                if steps > 0:
-                    g = self.fluid.normals(w, i, self.number(interval) + steps)
-                self.move(w, i, mobility, push_velocity, begin + elapsed, dt, g)
+                self.end_step(w, i, t, dt)
                 if self.s.own_fault[w, i] == 0:
                     elapsed = total
                     steps += 1
@@ -171,12 +170,11 @@ class IndependentBrownianSteps(PerParticle):
 
     @ti.func
     def move(self, w, i, mobility, push_velocity, t, dt, g):
-        """Move a particle by a step, and call the operators for it."""
+        """Move a particle by a step."""
         s, step = self.own, ti.cast(dt, self.s.real)
         s.velocity[w, i], s.position[w, i] = euler_step(
             s, self.fluid, w, i, mobility, push_velocity, t, step, g
         )
-        self.end_step(w, i, t, dt)
 
     @ti.func
     def end_step(self, w, i, t, dt):
