@@ -46,6 +46,7 @@ def test_families_export_all_their_parts(family):
         "FilledPart",
         "FilledRegion",
         "GrainShapes",
+        "Mixture",
         "PackingStepper",
         "Rods",
         "Shaped",
