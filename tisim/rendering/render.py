@@ -73,7 +73,11 @@ def render(
         alpha[behind] = 1
         ahead = front.depth > depth + LIFT
         rgb[ahead] += GLASS * (front.rgb[ahead] - rgb[ahead])
-    shade = np.repeat(np.repeat(_shade(depth, solids, fine), FINER, axis=0), FINER, axis=1)
+    shade = _shade(bodies.depth, solids, fine)
+    if depth is not bodies.depth:
+        # Walls in front of solids cast no shade on them.
+        on_walls = _shade(depth, solids, fine)
+        shade = np.where(np.isneginf(bodies.depth), on_walls, shade)
     rgb *= shade[..., None]
     if any(len(one) for one in edges):
         lines = _seen(fine, edges, planes)
@@ -112,11 +116,12 @@ def _seen(fine: Raster, groups: Sequence[Solids], planes: Planes, farthest: bool
 
 
 def _shade(depth: np.ndarray, solids: Sequence[Solids], fine: Raster) -> np.ndarray:
-    """Return the shade of narrow places, for pixels of the picture."""
+    """Return the shade of narrow places, from the depths of the pixels of the picture."""
     coarse = _blocks(depth, np.maximum) / FINER
     sizes = [group.sizes() * fine.scale / FINER for group in solids if len(group)]
     radius = float(np.median(np.concatenate(sizes))) if sizes else 1.0
-    return occlusion(coarse, radius if np.isfinite(radius) else 1.0)
+    shade = occlusion(coarse, radius if np.isfinite(radius) else 1.0)
+    return np.repeat(np.repeat(shade, FINER, axis=0), FINER, axis=1)
 
 
 def _resolved(rgb: np.ndarray, alpha: np.ndarray, depth: np.ndarray, raster: Raster) -> Picture:

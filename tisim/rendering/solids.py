@@ -17,8 +17,8 @@ from tisim.rendering.camera import Raster
 
 GRAZING = 1e-12
 """A ray whose squared sine to an axis is smaller runs along the axis."""
-SMALLEST_RADIUS = 1.0
-"""Smallest radius of a sphere in a picture, in pixels, so that it is visible."""
+SMALLEST_RADIUS = 2.0
+"""Smallest radius of a solid on a raster, in its pixels, so that it is visible."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,10 @@ class Solids:
 
     def finite(self) -> Self:
         """Return the solids without those whose position or size is not finite, or whose size is 0."""
+        if not len(self):
+            return self
         rows = [values.reshape(len(self), -1) for values in vars(self).values()]
-        sound = np.isfinite(np.hstack(rows)).all(axis=1) if len(self) else np.zeros(0, bool)
-        return self.where(sound & (self.sizes() > 0) if len(self) else sound)
+        return self.where(np.isfinite(np.hstack(rows)).all(axis=1) & (self.sizes() > 0))
 
     def seen_on(self, raster: Raster) -> Self:
         """Return the solids in the pixels of a raster."""

@@ -19,8 +19,8 @@ INDEX_BITS = 31
 DEPTHS = 2**32 - 2
 """Number of distinguished depths."""
 DEEPEST = 1e6
-"""Depths differ by at most this from their median, pixels. Farther ones are not distinguished, so that a
-solid far behind all others does not make the steps of depth coarse."""
+"""Depths farther than this from the median of the solids are not distinguished, pixels, so that a solid far
+behind all others does not make the steps of depth coarse."""
 EMPTY = -1
 """Value of a pixel that shows nothing."""
 TILE = 16
@@ -70,11 +70,13 @@ def layer(
         which have no thickness.
     """
     pieces = [_Rectangles.of(group.splats(), columns, rows) for group in groups]
-    near = np.concatenate([one.near for one in pieces]) if pieces else np.zeros(0)
-    far = np.concatenate([one.far for one in pieces]) if pieces else np.zeros(0)
+    near = np.concatenate([np.empty(0), *(one.near for one in pieces)])
+    far = np.concatenate([np.empty(0), *(one.far for one in pieces)])
     if not len(near):
         return Layer(np.full((rows, columns), EMPTY), tuple(groups))
-    buffer = _Buffer(columns, rows, near, far, farthest)
+    middle = float(np.median(np.concatenate([group.centre[:, 2] for group in groups])))
+    span = max(float(far.min()), middle - DEEPEST), min(float(near.max()), middle + DEEPEST)
+    buffer = _Buffer(columns, rows, span, farthest)
     group_of = np.repeat(np.arange(len(groups)), [len(one.solid) for one in pieces])
     row_of = np.concatenate([np.arange(len(one.solid)) for one in pieces])
     area = np.concatenate([one.columns * one.rows for one in pieces])
@@ -151,16 +153,15 @@ class _Rectangles:
 class _Buffer:
     """The pixels of a layer while solids are added."""
 
-    def __init__(self, columns: int, rows: int, near: np.ndarray, far: np.ndarray, farthest: bool) -> None:
+    def __init__(self, columns: int, rows: int, span: tuple[float, float], farthest: bool) -> None:
+        """span : least and largest depth that are distinguished."""
         self.columns, self.rows, self.farthest = columns, rows, farthest
         self.stride = -(-columns // LARGEST) * LARGEST
         self.keys = np.full((-(-rows // LARGEST) * LARGEST, self.stride), EMPTY, np.int64)
         # Pixels beyond the picture hide nothing, and nothing shows there.
         self.keys[rows:], self.keys[:, columns:] = np.iinfo(np.int64).max, np.iinfo(np.int64).max
-        middle = float(np.median(near))
-        self.back = max(float(far.min()), middle - DEEPEST)
-        span = min(float(near.max()), middle + DEEPEST) - self.back
-        self.steps = DEPTHS / (span if span > 0 else 1.0)
+        self.back = span[0]
+        self.steps = DEPTHS / max(span[1] - span[0], 1.0)
         self.filled: list[np.ndarray] = []
 
     def note_filled_tiles(self) -> None:
