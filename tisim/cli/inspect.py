@@ -212,21 +212,27 @@ def export(
     folder: IntoFolder = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
+    fields: Annotated[
+        str,
+        typer.Option(metavar="FIELD,...", help="Fields that are written, for vtk and xyz; all unless given."),
+    ] = "",
 ) -> None:
     """Convert the frames of a run to a format of other programs.
 
-    A trajectory is H5MD already; the format h5md makes a copy of it.
+    A trajectory is H5MD already; the format h5md makes a copy of it. For vtk the walls are written as
+    triangles.
     """
     from tisim.io.export import check, file_names
     from tisim.io.export import export as write
     from tisim.io.reader import frames, world_count
 
     file = _trajectory_file(file)
-    check(file, kind)
+    names = [name.strip() for name in fields.split(",")] if fields else []
+    check(file, kind, names)
     out_folder = folder or file.parent
     output_folder.claim(out_folder, file_names(file, kind), overwrite)
     with _progress("writing") as progress:
-        path = write(file, kind, out_folder, progress)
+        path = write(file, kind, out_folder, progress, names)
     for world in range(count := world_count(file)):
         with frames(file, world) as trajectory:
             _print_missing(

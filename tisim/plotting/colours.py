@@ -33,8 +33,8 @@ WIDE_RANGE = 20.0
 """A scale is logarithmic if the ratio of its largest to its smallest value exceeds this."""
 TAILS = 1.0
 """Percentage of the smallest values, and of the largest, that may be beyond the scale."""
-LONG_TAIL = 3.0
-"""Values are beyond the scale if the range of all values exceeds that of the others by this factor."""
+LONG_TAIL = 1.0
+"""A tail is beyond the scale if it reaches farther than this, relative to the range of all other values."""
 SAMPLES = 400
 """Number of quantiles of a state by which its values enter the scale."""
 
@@ -161,14 +161,17 @@ def scale(values: np.ndarray) -> tuple[Normalize, str]:
     if not len(values):
         return Normalize(0.0, 1.0), "neither"
     ends = float(values.min()), float(values.max())
-    low, high = np.percentile(values, [TAILS, 100 - TAILS])
-    if not 0 < high - low < (ends[1] - ends[0]) / LONG_TAIL:
-        low, high = ends
-    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    beyond = extend[bool(ends[0] < low), bool(ends[1] > high)]
+    low, high = (float(one) for one in np.percentile(values, [TAILS, 100 - TAILS]))
+    usual = high - low
+    below = 0 < LONG_TAIL * usual < low - ends[0]
+    above = 0 < LONG_TAIL * usual < ends[1] - high
+    low, high = low if below else ends[0], high if above else ends[1]
+    beyond = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[
+        below, above
+    ]
     if low > 0 and high > WIDE_RANGE * low:
         return LogNorm(low, high), beyond
     # A scale finer than a hundredth would exaggerate negligible differences.
     least = max(0.01 * abs(low), 1e-300) / 2
     middle = (low + high) / 2
-    return Normalize(float(min(low, middle - least)), float(max(high, middle + least))), beyond
+    return Normalize(min(low, middle - least), max(high, middle + least)), beyond
