@@ -137,7 +137,7 @@ def crowd(rng) -> list[Solids]:
             exponents=np.tile([2.0, 4.0, 8.0], (n, 1)),
         ),
         DrawnTriangles.of(corners, BLUE),
-        DrawnLines.of(place[5][: n // 2].reshape(-1, 2, 3), GREEN, 3.0),
+        DrawnLines.of(place[5].reshape(-1, 2, 3), GREEN, 3.0),
     ]  # fmt: skip
 
 

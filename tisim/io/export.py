@@ -116,13 +116,12 @@ def _vtk(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
     for k, frame in enumerate(frames_to_write):
         frame_file = _frame_name(name, k)
         replace_file(folder / frame_file, _vtu(frame.arrays))
-        dataset = {"timestep": repr(frame.time), "file": frame_file}
-        ElementTree.SubElement(datasets, "DataSet", part="0", **dataset)
+        _dataset(datasets, frame.time, "0", frame_file)
         if walls:
             own = _frame_name(f"{name}_walls", walls[min(k, len(walls) - 1)])
             if k < len(walls):
                 replace_file(folder / own, _vtu_of_walls(trajectory, frame))
-            ElementTree.SubElement(datasets, "DataSet", part="1", **{**dataset, "file": own})
+            _dataset(datasets, frame.time, "1", own)
     replace_file(folder / f"{name}.pvd", _xml(collection))
     return folder / f"{name}.pvd"
 
@@ -133,6 +132,10 @@ def _world_name(file: Path, world: int, worlds: int) -> str:
 
 def _frame_name(name: str, k: int) -> str:
     return f"{name}_{k:05d}.vtu"
+
+
+def _dataset(collection: ElementTree.Element, time: float, part: str, file: str) -> None:
+    ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part=part, file=file)
 
 
 def _frames_of_walls(trajectory: Frames) -> list[int]:
@@ -195,9 +198,9 @@ def _grid(
         "VTKFile", type="UnstructuredGrid", version="1.0", byte_order="LittleEndian", header_type="UInt64"
     )
     grid = ElementTree.SubElement(root, "UnstructuredGrid")
-    sizes = {"NumberOfPoints": str(len(points)), "NumberOfCells": str(len(corners))}
-    piece = ElementTree.SubElement(grid, "Piece", **sizes)
-    element = ElementTree.SubElement(piece, kind, **chosen)
+    counts = {"NumberOfPoints": str(len(points)), "NumberOfCells": str(len(corners))}
+    piece = ElementTree.SubElement(grid, "Piece", counts)
+    element = ElementTree.SubElement(piece, kind, dict(chosen))
     for name, values in data.items():
         _data_array(element, name, values)
     _data_array(ElementTree.SubElement(piece, "Points"), "position", points)

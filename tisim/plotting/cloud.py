@@ -24,7 +24,9 @@ from tisim.shapes.particle_shape import ParticleShape
 
 GRAVITY_COLOUR = "#b3413e"
 """Colour of the arrow of gravity."""
-HALO = [patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
+HALO: list[patheffects.AbstractPathEffect] = [
+    patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)
+]
 """White edges of texts and lines over a picture."""
 NO_MEASURES: Mapping[str, float] = {}
 

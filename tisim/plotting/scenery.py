@@ -63,7 +63,9 @@ def box_scenery(low: np.ndarray | None, high: np.ndarray | None) -> Scenery:
     if low is None or high is None:
         return NOTHING
     corners = box_corners(np.asarray(low, float), np.asarray(high, float))
-    edges = DrawnLines.of(np.array([corners[list(ends)] for ends in BOX_EDGES]), BOX_COLOUR, BOX_WIDTH)
+    edges = DrawnLines.of(
+        np.array([corners[list(ends)] for ends in BOX_EDGES]), np.array(BOX_COLOUR), BOX_WIDTH
+    )
     return Scenery(edges=(edges,), points=corners, bounded=True)
 
 
@@ -179,7 +181,7 @@ def window(
     camera = look.camera
     fixed = [_rectangle(camera.project(one.points)[:, :2]) for one in surroundings if len(one.points)]
     fixed += [found for one in surroundings if (found := extent_of(one.solids, camera)) is not None]
-    later = []
+    later: list[tuple[np.ndarray, np.ndarray]] = []
     for number, state in enumerate(states):
         place, radius = finite_grains(state)
         right_up = camera.project(place)[:, :2]

@@ -77,5 +77,5 @@ def _nearer(z: np.ndarray, way: np.ndarray, most: np.float32) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         apart = np.maximum(z[there] - z[here], -most)
         apart = np.where(apart > most, most * most / np.maximum(apart, most), apart)
-        result[here] = np.nan_to_num(apart, nan=-most)
+        result[here] = np.where(np.isnan(apart), -most, apart)
     return result

@@ -9,7 +9,7 @@ mirrored ray.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -37,8 +37,11 @@ class Splats:
 class Solids:
     """Solids of one kind.
 
-    centre : m, shape (n, 3). colour : red, green and blue, 0..1, shape (n, 3).
+    centre : m, shape (n, 3). colour : red, green and blue, 0..1, shape (n, 3). slow : whether ``top`` takes
+    much longer than the comparison of depths.
     """
+
+    slow: ClassVar[bool] = False
 
     centre: np.ndarray
     colour: np.ndarray

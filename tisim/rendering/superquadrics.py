@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from functools import reduce
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -24,6 +25,8 @@ class DrawnSuperquadrics(Solids):
     exponents : 2 or more, shape (n, 3).
     """
 
+    slow: ClassVar[bool] = True
+
     turn: np.ndarray
     semi_axes: np.ndarray
     exponents: np.ndarray
@@ -38,7 +41,15 @@ class DrawnSuperquadrics(Solids):
         return replace(self, centre=raster.place(self.centre), turn=turn, semi_axes=semi_axes)
 
     def splats(self) -> Splats:
-        spread = np.einsum("nka,na->nk", np.abs(self.turn), self.semi_axes)
+        """Return boxes around the superquadrics: exact ones if all exponents of a body are equal, and
+        otherwise as for the largest of them.
+
+        A superquadric of exponents g extends to the norm of a n with the exponent g/(g - 1) along n.
+        """
+        power = (1 + 1 / (self.exponents.max(axis=1) - 1))[:, None, None]
+        reach = np.abs(self.turn) * self.semi_axes[:, None, :]
+        most = reach.max(axis=2, keepdims=True)
+        spread = most[..., 0] * ((reach / most) ** power).sum(axis=2) ** (1 / power[..., 0])
         return Splats(np.arange(len(self)), self.centre - spread, self.centre + spread)
 
     def top(self, k: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -50,27 +61,35 @@ class DrawnSuperquadrics(Solids):
         """
         k, x, y = np.broadcast_arrays(k, x, y)
         shape, k = k.shape, k.ravel()
-        u, v = (x.ravel() - self.centre[k, 0])[:, None], (y.ravel() - self.centre[k, 1])[:, None]
-        turn, a, g = self.turn[k], self.semi_axes[k], self.exponents[k]
-        q, e = (u * turn[:, 0] + v * turn[:, 1]) / a, turn[:, 2] / a
-        e = np.where(np.abs(e) < 1e-12, 1e-12, e)
-        ends = np.stack([(1 - q) / e, (-1 - q) / e])
-        z, low = ends.max(axis=0).min(axis=1), ends.min(axis=0).max(axis=1)
+        u, v = x.ravel() - self.centre[k, 0], y.ravel() - self.centre[k, 1]
+        frame = self.turn / self.semi_axes[:, None, :]
+        # Components one after another: sums over a last axis of three are slow.
+        q = [u * frame[k, 0, c] + v * frame[k, 1, c] for c in range(3)]
+        e = [np.where(np.abs(frame[:, 2, c]) < 1e-12, 1e-12, frame[:, 2, c])[k] for c in range(3)]
+        inverse = [1 / one for one in e]
+        z = reduce(np.minimum, (np.abs(i) - a * i for a, i in zip(q, inverse, strict=True)))
+        low = reduce(np.maximum, (-np.abs(i) - a * i for a, i in zip(q, inverse, strict=True)))
         found = np.full(len(k), -np.inf)
         rows = np.flatnonzero(z >= low)
+        q, e, z, low = [a[rows] for a in q], [a[rows] for a in e], z[rows], low[rows]
+        g = [self.exponents[k[rows], c] for c in range(3)]
         for _ in range(ROUNDS):
-            place = np.abs(q[rows] + z[rows, None] * e[rows])
-            powers = place ** (g[rows] - 1)
-            level = (powers * place).sum(axis=1) - 1
-            slope = (g[rows] * powers * np.sign(q[rows] + z[rows, None] * e[rows]) * e[rows]).sum(axis=1)
+            level, slope = -1.0, 0.0
+            for a, b, power in zip(q, e, g, strict=True):
+                place = a + z * b
+                size = np.abs(place)
+                term = size ** (power - 1)
+                level = level + term * size
+                slope = slope + power * term * np.sign(place) * b
             done = level < ON_SURFACE
-            found[rows[done]] = z[rows[done]]
-            going = ~done & (slope > 0)
-            rows = rows[going]
-            if not len(rows):
+            found[rows[done]] = z[done]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                z = z - level / slope
+            going = np.flatnonzero(~done & (slope > 0) & (z >= low))
+            if not len(going):
                 break
-            z[rows] -= level[going] / slope[going]
-            rows = rows[z[rows] >= low[rows]]
+            rows, z, low = rows[going], z[going], low[going]
+            q, e, g = ([a[going] for a in each] for each in (q, e, g))
         return (found + self.centre[k, 2]).reshape(shape)
 
     def normal(self, k: np.ndarray, point: np.ndarray) -> np.ndarray:

@@ -142,9 +142,8 @@ class _Rectangles:
         at = np.stack([rank % count[from_, 0], rank // count[from_, 0]], axis=1)
         begin = low[from_] + LARGEST * at
         span = np.minimum(high[from_] - begin, LARGEST)
-        return cls(
-            splats.solid[from_], *begin.T, *span.T, splats.high[from_, 2], splats.low[from_, 2]
-        )  # fmt: skip
+        near, far = splats.high[from_, 2], splats.low[from_, 2]
+        return cls(splats.solid[from_], begin[:, 0], begin[:, 1], span[:, 0], span[:, 1], near, far)
 
     def where(self, kept: np.ndarray) -> _Rectangles:
         return _Rectangles(*(values[kept] for values in vars(self).values()))
@@ -218,14 +217,19 @@ class _Buffer:
         """Fill rectangles, all enlarged to the same numbers of columns and rows."""
         column = np.minimum(some.column, self.stride - columns)[:, None, None] + np.arange(columns)
         row = np.minimum(some.row, self.keys.shape[0] - rows)[:, None, None] + np.arange(rows)[:, None]
-        k = some.solid[:, None, None]
-        z, _ = entry(group, k, column + 0.5, row + 0.5, planes)
+        pixel, k = row * self.stride + column, some.solid[:, None, None]
+        x, y = column + 0.5, row + 0.5
+        if group.slow and not self.farthest:
+            # Only rays that are not filled in front of the solid.
+            seen = (self.keys.reshape(-1)[pixel] >> INDEX_BITS) <= self.depth(some.near)[:, None, None]
+            pixel, k, x, y = (np.broadcast_to(one, seen.shape)[seen] for one in (pixel, k, x, y))
+        z, _ = entry(group, k, x, y, planes)
         hit = z > -np.inf
         depth = self.depth(z[hit])
         if self.farthest:
             depth = DEPTHS - depth
         solid = np.broadcast_to(k + first, z.shape)[hit]
-        np.maximum.at(self.keys.reshape(-1), (row * self.stride + column)[hit], (depth << INDEX_BITS) | solid)
+        np.maximum.at(self.keys.reshape(-1), pixel[hit], (depth << INDEX_BITS) | solid)
 
     def solids(self) -> np.ndarray:
         """Return the index of the solid in each pixel, -1 for none, shape (rows, columns)."""
