@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from tests.scenes import scene
 from tisim import InputError, Material
 from tisim.plotting.colours import MATERIAL_COLOURS, colouring, scale, values_of
-from tisim.plotting.look import USUAL, WHOLE, Look
+from tisim.plotting.look import USUAL, WHOLE_PICTURE, Look
 from tisim.rendering.camera import Camera, ClipPlane
 
 PLAIN = scene([(0, 0, 0)], [(0, 0, 0)])
@@ -98,7 +98,7 @@ def test_texts_describe_a_look():
         Camera(30.0, -20.0), "speed", (ClipPlane((0, 1, 0), 0.01), ClipPlane((0, 0, -1), 2e-3)),
         (0.1, 0.9, 0.0, 0.5),
     )  # fmt: skip
-    assert Look.of(view="0,90").crop == WHOLE
+    assert Look.of(view="0,90").crop == WHOLE_PICTURE
 
 
 @pytest.mark.parametrize(

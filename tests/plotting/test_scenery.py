@@ -11,7 +11,7 @@ from tisim import Box, Material, geometry
 from tisim.effects import Granular, Walls
 from tisim.plotting.cloud import caption, start_and_end
 from tisim.plotting.look import Look
-from tisim.plotting.scenery import NOTHING, box_scenery, remaining, scenery, window
+from tisim.plotting.scenery import NO_SCENERY, box_scenery, remaining, scenery, window
 from tisim.rendering.camera import Window
 from tisim.sources import Cylinder, MagneticCylinders, MagneticSpheres, PoreFlow, Sphere
 
@@ -54,7 +54,7 @@ def test_with_walls_or_a_box_even_all_grains_may_leave(rng):
     fallen = state(grains["position"] - [0, 0, 1e4])
     box = box_scenery(np.full(3, -1.5), np.full(3, 1.5))
     assert window([grains, fallen], [box], FRONT).height <= 2 * 3 * 1.06
-    assert window([grains, fallen], [NOTHING], FRONT).height > 1e4
+    assert window([grains, fallen], [NO_SCENERY], FRONT).height > 1e4
 
 
 def test_a_crop_is_a_part_of_the_window():

@@ -15,9 +15,9 @@ from tisim.geometry.shape import Shape
 from tisim.geometry.sphere import SphericalSurface
 from tisim.geometry.triangles import TriangulatedSurface
 
-SECTORS = 96
+FACETS_AROUND = 96
 """Number of facets around an axis."""
-RINGS = 48
+SPHERE_RINGS = 48
 """Number of facets between the poles of a sphere."""
 FOLD = np.cos(np.radians(15))
 """An edge between two triangles is sharp if the cosine of the angle between their normals is below this."""
@@ -53,7 +53,7 @@ def _(shape: BoxSurface) -> np.ndarray:
 
 @tessellated.register
 def _(shape: SphericalSurface) -> np.ndarray:
-    polar = np.linspace(0, np.pi, RINGS + 1)
+    polar = np.linspace(0, np.pi, SPHERE_RINGS + 1)
     profile = shape.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1)
     return _revolved(profile, np.array(shape.centre), np.array([0.0, 0.0, 1.0]))
 
@@ -72,7 +72,7 @@ def _revolved(profile: np.ndarray, origin: np.ndarray, axis: np.ndarray) -> np.n
 
     profile : distance from the axis and coordinate along it, m, shape (points, 2).
     """
-    angle = 2 * np.pi * np.arange(SECTORS + 1) / SECTORS
+    angle = 2 * np.pi * np.arange(FACETS_AROUND + 1) / FACETS_AROUND
     a, b = across(axis)
     outward = np.cos(angle)[:, None] * a + np.sin(angle)[:, None] * b
     # The last direction is the first to the last bit, so that no seam is left open.
@@ -87,7 +87,7 @@ def _revolved(profile: np.ndarray, origin: np.ndarray, axis: np.ndarray) -> np.n
 
 
 def box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return the corners of a box (m), shape (8, 3); the bits of their indices are those of x, y and z."""
+    """Return the corners of a box (m), shape (8, 3); the bits of their indices are x, y and z."""
     return np.array(list(product(*zip(low, high, strict=True))))
 
 

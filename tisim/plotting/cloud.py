@@ -15,7 +15,7 @@ from tisim.plotting.bodies import shapes_of, solids_of
 from tisim.plotting.colours import colouring, plain_colours
 from tisim.plotting.image import PIXELS, draw_solids
 from tisim.plotting.look import USUAL, Look
-from tisim.plotting.scenery import NOTHING, Scenery, finite_grains, scenery, window
+from tisim.plotting.scenery import NO_SCENERY, Scenery, finite_grains, scenery, window
 from tisim.plotting.style import empty, letters, si
 from tisim.rendering.camera import USUAL_CAMERA, Camera, Window
 from tisim.scene.initial_state import Arrays
@@ -88,7 +88,7 @@ def panel(
     axis: Axes,
     state: Arrays,
     part: Window,
-    around: Scenery = NOTHING,
+    around: Scenery = NO_SCENERY,
     colour: np.ndarray | None = None,
     shapes: Sequence[ParticleShape] = (),
     look: Look = USUAL,

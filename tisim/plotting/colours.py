@@ -35,7 +35,7 @@ TAILS = 1.0
 """Percentage of the smallest values, and of the largest, that may be beyond the scale."""
 LONG_TAIL = 1.0
 """A tail is beyond the scale if it reaches farther than this, relative to the range of all other values."""
-SAMPLES = 400
+COLOUR_SAMPLES = 400
 """Number of quantiles of a state by which its values enter the scale."""
 
 
@@ -68,7 +68,12 @@ class Colouring:
     def legend(self, figure: Figure, beside: Any, place: Axes | None = None) -> None:
         """Draw the legend: beside axes, or in given axes."""
         if self.names:
-            self._patches(figure, place)
+            style: dict[str, Any] = {"handles": self.patches(), "frameon": False, "title": self.name}
+            if place is None:
+                figure.legend(loc="outside right center", **style)
+            else:
+                place.set_axis_off()
+                place.legend(loc="center left", bbox_to_anchor=(0.0, 0.5), **style)
             return
         at = {"ax": beside, "shrink": 0.72, "pad": 0.01} if place is None else {"cax": place}
         bar = figure.colorbar(ScalarMappable(self.norm, self.map), extend=self.extend, **at)
@@ -78,16 +83,10 @@ class Colouring:
             quantity(bar.ax.yaxis, self.name, self.unit)
         bar.outline.set_visible(False)
 
-    def _patches(self, figure: Figure, place: Axes | None) -> None:
-        """Draw one patch for each material."""
+    def patches(self) -> list[Patch]:
+        """Return one patch for each material, for a legend."""
         colours = MATERIAL_COLOURS[np.arange(len(self.names)) % len(MATERIAL_COLOURS)]
-        patches = [Patch(color=colour, label=name) for colour, name in zip(colours, self.names, strict=True)]
-        style: dict[str, Any] = {"handles": patches, "frameon": False, "title": self.name}
-        if place is None:
-            figure.legend(loc="outside right center", **style)
-        else:
-            place.set_axis_off()
-            place.legend(loc="center left", bbox_to_anchor=(0.0, 0.5), **style)
+        return [Patch(color=colour, label=name) for colour, name in zip(colours, self.names, strict=True)]
 
 
 def plain_colours(number: int) -> np.ndarray:
@@ -152,7 +151,7 @@ def scaled(scene: Scene, name: str, values: Sequence[np.ndarray]) -> Colouring:
 def sample(values: np.ndarray) -> np.ndarray:
     """Return the finite values, or quantiles of them if there are many."""
     values = values[np.isfinite(values)].astype(float)
-    return np.quantile(values, np.linspace(0, 1, SAMPLES)) if len(values) > SAMPLES else values
+    return np.quantile(values, np.linspace(0, 1, COLOUR_SAMPLES)) if len(values) > COLOUR_SAMPLES else values
 
 
 def scale(values: np.ndarray) -> tuple[Normalize, str]:

@@ -11,7 +11,7 @@ from tisim.rendering.camera import USUAL_CAMERA, Camera, ClipPlane
 
 Crop = tuple[float, float, float, float]
 """Left, right, bottom and top of a part of a picture, 0..1."""
-WHOLE: Crop = (0.0, 1.0, 0.0, 1.0)
+WHOLE_PICTURE: Crop = (0.0, 1.0, 0.0, 1.0)
 _CUT = re.compile(r"\s*([xyz])\s*([<>])\s*(\S+)\s*")
 
 
@@ -27,7 +27,7 @@ class Look:
     camera: Camera = USUAL_CAMERA
     colour: str | None = None
     clip: tuple[ClipPlane, ...] = ()
-    crop: Crop = WHOLE
+    crop: Crop = WHOLE_PICTURE
 
     @classmethod
     def of(
@@ -43,7 +43,7 @@ class Look:
             azimuth, elevation = _numbers(view, "view", "azimuth,elevation in degrees", 2)
             must(-90 <= elevation <= 90, "elevation of the view", "-90 to 90 degrees", elevation)
             camera = Camera(azimuth, elevation)
-        part = WHOLE
+        part = WHOLE_PICTURE
         if crop:
             left, right, bottom, top = _numbers(crop, "crop", "left,right,bottom,top of the picture", 4)
             inside = 0 <= left < right <= 1 and 0 <= bottom < top <= 1

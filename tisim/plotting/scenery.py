@@ -27,11 +27,11 @@ EDGE_COLOUR, EDGE_WIDTH = (0.45, 0.45, 0.45), 2.2
 """Colour of edges of walls, and their width, rays."""
 BOX_COLOUR, BOX_WIDTH = (0.55, 0.55, 0.55), 1.8
 """Colour and width of the edges of the box, as of walls."""
-STEEL = (0.70, 0.72, 0.75)
+BODY_COLOUR = (0.70, 0.72, 0.75)
 """Colour of magnets and fibres."""
 FAR = 20.0
 """Walls farther away than this, relative to the size of the scene, are left out."""
-TAIL = 10.0
+OUTER_PART = 10.0
 """Percentage of grains at each end of a coordinate by which the extent of the others is measured."""
 FENCE = 2.0
 """Grains farther than this many extents from the others have left the scene, and do not widen the picture."""
@@ -54,14 +54,14 @@ class Scenery:
     bounded: bool = False
 
 
-NOTHING = Scenery()
+NO_SCENERY = Scenery()
 """The surroundings of grains in open space."""
 
 
 def box_scenery(low: np.ndarray | None, high: np.ndarray | None) -> Scenery:
     """Return the edges of a box (m); nothing in open space."""
     if low is None or high is None:
-        return NOTHING
+        return NO_SCENERY
     corners = box_corners(np.asarray(low, float), np.asarray(high, float))
     edges = DrawnLines.of(
         np.array([corners[list(ends)] for ends in BOX_EDGES]), np.array(BOX_COLOUR), BOX_WIDTH
@@ -103,7 +103,7 @@ def _bodies(scene: Scene) -> list[Solids]:
         found.append(
             DrawnCylinders(
                 centre=np.array([one.centre for one in cylinders]),
-                colour=np.tile(STEEL, (len(cylinders), 1)),
+                colour=np.tile(BODY_COLOUR, (len(cylinders), 1)),
                 axis=np.array([one.direction for one in cylinders]),
                 half=np.array([one.length / 2 for one in cylinders]),
                 radius=np.array([one.radius for one in cylinders]),
@@ -112,7 +112,8 @@ def _bodies(scene: Scene) -> list[Solids]:
     if spheres:
         found.append(
             DrawnSpheres(
-                centre=np.array([one.centre for one in spheres]), colour=np.tile(STEEL, (len(spheres), 1)),
+                centre=np.array([one.centre for one in spheres]),
+                colour=np.tile(BODY_COLOUR, (len(spheres), 1)),
                 radius=np.array([one.radius for one in spheres]),
             )
         )  # fmt: skip
@@ -132,8 +133,8 @@ def _extents(bodies: Sequence[Solids]) -> list[np.ndarray]:
 
 
 def _extents_of_grains(states: Sequence[Arrays]) -> list[np.ndarray]:
-    """Return corners of boxes (m) around the grains: of the first state all, of the others those that have
-    not left."""
+    """Return corners of boxes (m) around the grains: of the first state all, of later ones all that have not
+    left."""
     points = []
     for number, state in enumerate(states):
         place, radius = finite_grains(state)
@@ -161,8 +162,8 @@ def remaining(place: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """
     if not len(place):
         return np.zeros(0, bool)
-    low, high = np.percentile(place, [TAIL, 100 - TAIL], axis=0)
-    reach = FENCE * (float((high - low).max()) + 2 * float(np.percentile(radius, 100 - TAIL)))
+    low, high = np.percentile(place, [OUTER_PART, 100 - OUTER_PART], axis=0)
+    reach = FENCE * (float((high - low).max()) + 2 * float(np.percentile(radius, 100 - OUTER_PART)))
     kept: np.ndarray = ((place >= low - reach) & (place <= high + reach)).all(axis=1)
     return kept
 
@@ -175,7 +176,7 @@ def window(
 ) -> Window:
     """Return the window that shows states and their surroundings, or the part of it that ``look`` shows.
 
-    All grains of the first state are in it, and those of the others that have not left. ratio : width over
+    All grains of the first state are in it, and of later ones all that have not left. ratio : width over
     height.
     """
     camera = look.camera

@@ -35,7 +35,7 @@ class Picture:
     """A picture.
 
     rgba : red, green, blue and opacity, 0..1, shape (rows, columns, 4), from the lowest row upwards. depth :
-    distance of the nearest surface towards the viewer, pixels, -inf where there is none, shape (rows,
+    distance of the nearest surface towards the viewer, pixels, -inf if there is none, shape (rows,
     columns).
     """
 
@@ -45,7 +45,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Colours and depths along all rays; the depth is -inf where there is nothing."""
+    """Colours and depths along all rays; the depth is -inf for a ray that meets nothing."""
 
     rgb: np.ndarray
     depth: np.ndarray

@@ -10,12 +10,12 @@ LIGHT = np.array([-0.45, 0.6, 0.66]) / np.linalg.norm([-0.45, 0.6, 0.66])
 HALFWAY = (LIGHT + np.eye(3)[2]) / np.linalg.norm(LIGHT + np.eye(3)[2])
 """Normal of a surface that reflects the light towards the viewer."""
 AMBIENT, WALL_AMBIENT = 0.45, 0.74
-"""Brightness of solids, and of walls, where they face away from the light."""
+"""Brightness of solids, and of walls, that face away from the light."""
 GLOSS, SHARPNESS = 0.22, 40
 """Brightness and exponent of the highlight."""
 DARKEST = 0.08
 """Dark colours are lightened by this, so that their shading is visible."""
-DIRECTIONS = 8
+SHADE_DIRECTIONS = 8
 """Pairs of opposite directions in which the surroundings of a pixel are compared with it."""
 SHADE = 1.1
 """Strength of the shade of narrow places."""
@@ -23,7 +23,7 @@ SMOOTHING = 0.35
 """Width over which the shade is smoothed, in units of the smaller distance."""
 DARKEST_SHADE = 0.3
 """Brightness of the narrowest places."""
-NEAR, WIDE = (1.5, 24.0), 3.0
+SHADE_DISTANCES, WIDE_SHADE = (1.5, 24.0), 3.0
 """Limits of the smaller distance of compared pixels, and the larger distance in units of the smaller one."""
 
 
@@ -31,7 +31,7 @@ def lit(normal: np.ndarray, colour: np.ndarray, ambient: float = AMBIENT) -> np.
     """Return the colours of surfaces in the light.
 
     normal : unit normals, shape (n, 3). colour : red, green and blue, 0..1, shape (n, 3). ambient :
-        brightness where they face away from the light.
+        brightness of surfaces that face away from the light.
     """
     towards = np.clip(normal @ LIGHT, 0, 1)
     gloss = GLOSS * np.clip(normal @ HALFWAY, 0, 1) ** SHARPNESS
@@ -50,18 +50,18 @@ def occlusion(depth: np.ndarray, radius: float) -> np.ndarray:
 
     A difference h of depth that exceeds |d| counts as |d|^2/h, so that distant surfaces cast no shade.
 
-    depth : pixels, -inf where nothing is drawn, shape (rows, columns). radius : usual radius of a solid,
+    depth : pixels, -inf for an empty pixel, shape (rows, columns). radius : usual radius of a solid,
         pixels.
     """
     bright = np.ones(depth.shape, np.float32)
     z = depth.astype(np.float32)
-    near = float(np.clip(radius / 2, *NEAR))
-    for reach in (near, WIDE * near):
-        for angle in np.pi * (np.arange(DIRECTIONS) + 0.5 * (reach > near)) / DIRECTIONS:
+    near = float(np.clip(radius / 2, *SHADE_DISTANCES))
+    for reach in (near, WIDE_SHADE * near):
+        for angle in np.pi * (np.arange(SHADE_DIRECTIONS) + 0.5 * (reach > near)) / SHADE_DIRECTIONS:
             way = np.rint(reach * np.array([np.sin(angle), np.cos(angle)])).astype(int)
             length = np.float32(max(1.0, np.hypot(*way)))
             pair = (_nearer(z, way, length) + _nearer(z, -way, length)) / (2 * length)
-            bright -= SHADE / (2 * DIRECTIONS) * np.maximum(pair, 0)
+            bright -= SHADE / (2 * SHADE_DIRECTIONS) * np.maximum(pair, 0)
     return np.maximum(gaussian_filter(bright, SMOOTHING * near, mode="nearest", truncate=2), DARKEST_SHADE)
 
 

@@ -17,7 +17,7 @@ from tisim.rendering.camera import Raster
 
 GRAZING = 1e-12
 """A ray whose squared sine to an axis is smaller runs along the axis."""
-SMALLEST_RADIUS = 2.0
+SMALLEST_DRAWN = 2.0
 """Smallest radius of a solid on a raster, in its pixels, so that it is visible."""
 
 
@@ -97,7 +97,7 @@ class DrawnSpheres(Solids):
         return self.radius
 
     def seen_on(self, raster: Raster) -> Self:
-        radius = np.maximum(self.radius * raster.scale, SMALLEST_RADIUS)
+        radius = np.maximum(self.radius * raster.scale, SMALLEST_DRAWN)
         return replace(self, centre=raster.place(self.centre), radius=radius)
 
     def splats(self) -> Splats:
@@ -132,7 +132,7 @@ class _Swept(Solids):
         return around * (self.radius > 0)
 
     def seen_on(self, raster: Raster) -> Self:
-        radius = np.maximum(self.radius * raster.scale, SMALLEST_RADIUS)
+        radius = np.maximum(self.radius * raster.scale, SMALLEST_DRAWN)
         return replace(
             self, centre=raster.place(self.centre), axis=raster.camera.project(self.axis),
             half=self.half * raster.scale, radius=radius,

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from tisim.rendering.camera import Raster
-from tisim.rendering.solids import SMALLEST_RADIUS, Solids, Splats
+from tisim.rendering.solids import SMALLEST_DRAWN, Solids, Splats
 
 ROUNDS = 30
 """Largest number of Newton's steps along a ray; 3 to 8 are usual."""
@@ -37,7 +37,7 @@ class DrawnSuperquadrics(Solids):
 
     def seen_on(self, raster: Raster) -> Self:
         turn = np.einsum("ka,nkb->nab", raster.camera.axes, self.turn)
-        semi_axes = np.maximum(self.semi_axes * raster.scale, SMALLEST_RADIUS)
+        semi_axes = np.maximum(self.semi_axes * raster.scale, SMALLEST_DRAWN)
         return replace(self, centre=raster.place(self.centre), turn=turn, semi_axes=semi_axes)
 
     def splats(self) -> Splats:
@@ -55,9 +55,9 @@ class DrawnSuperquadrics(Solids):
     def top(self, k: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return z of the entry.
 
-        In the frame scaled by the semi-axes a ray is q + z e. It enters the box |q_k + z e_k| <= 1 where the
-        sum of powers is 1 to 3. The sum is convex in z, so Newton's method from there moves monotonically to
-        the entry, or past the least value if the ray misses.
+        In the frame scaled by the semi-axes a ray is q + z e. At its entry into the box |q_k + z e_k| <= 1
+        the sum of powers is 1 to 3. The sum is convex in z, so Newton's method from there moves
+        monotonically to the entry, or past the least value if the ray misses.
         """
         k, x, y = np.broadcast_arrays(k, x, y)
         shape, k = k.shape, k.ravel()

@@ -18,18 +18,18 @@ INDEX_BITS = 31
 """Bits of the index of a solid; the depth has 32."""
 DEPTHS = 2**32 - 2
 """Number of distinguished depths."""
-DEEPEST = 1e6
+DEPTH_RANGE = 1e6
 """Depths farther than this from the median of the solids are not distinguished, pixels, so that a solid far
 behind all others does not make the steps of depth coarse."""
 EMPTY = -1
 """Value of a pixel that shows nothing."""
-TILE = 16
+SMALLEST_TILE = 16
 """Side of the smallest tile, pixels."""
-LEVELS = 5
+TILE_SIZES = 5
 """Number of sizes of tiles, each twice as large as the one before."""
-LARGEST = TILE << (LEVELS - 1)
+LARGEST_RECTANGLE = SMALLEST_TILE << (TILE_SIZES - 1)
 """Larger rectangles are split, pixels."""
-SIDES = np.unique(np.rint(LARGEST * 2.0 ** (-0.5 * np.arange(17))).astype(int))
+RECTANGLE_SIDES = np.unique(np.rint(LARGEST_RECTANGLE * 2.0 ** (-0.5 * np.arange(17))).astype(int))
 """Sides to which rectangles are enlarged, so that many are processed together, pixels."""
 PIXELS_AT_ONCE = 500_000
 """Number of pixels that are tested at a time."""
@@ -75,7 +75,7 @@ def layer(
     if not len(near):
         return Layer(np.full((rows, columns), EMPTY), tuple(groups))
     middle = float(np.median(np.concatenate([group.centre[:, 2] for group in groups])))
-    span = max(float(far.min()), middle - DEEPEST), min(float(near.max()), middle + DEEPEST)
+    span = max(float(far.min()), middle - DEPTH_RANGE), min(float(near.max()), middle + DEPTH_RANGE)
     buffer = _Buffer(columns, rows, span, farthest)
     group_of = np.repeat(np.arange(len(groups)), [len(one.solid) for one in pieces])
     row_of = np.concatenate([np.arange(len(one.solid)) for one in pieces])
@@ -134,14 +134,14 @@ class _Rectangles:
         size = np.array([columns, rows])
         low = np.clip(np.ceil(splats.low[:, :2] - 0.5), 0, size).astype(int)
         high = np.clip(np.floor(splats.high[:, :2] - 0.5) + 1, 0, size).astype(int)
-        count = -(-(high - low) // LARGEST)
+        count = -(-(high - low) // LARGEST_RECTANGLE)
         some = np.flatnonzero((high > low).all(axis=1))
         pieces = count[some].prod(axis=1)
         from_ = np.repeat(some, pieces)
         rank = np.arange(len(from_)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
         at = np.stack([rank % count[from_, 0], rank // count[from_, 0]], axis=1)
-        begin = low[from_] + LARGEST * at
-        span = np.minimum(high[from_] - begin, LARGEST)
+        begin = low[from_] + LARGEST_RECTANGLE * at
+        span = np.minimum(high[from_] - begin, LARGEST_RECTANGLE)
         near, far = splats.high[from_, 2], splats.low[from_, 2]
         return cls(splats.solid[from_], begin[:, 0], begin[:, 1], span[:, 0], span[:, 1], near, far)
 
@@ -155,8 +155,8 @@ class _Buffer:
     def __init__(self, columns: int, rows: int, span: tuple[float, float], farthest: bool) -> None:
         """span : least and largest depth that are distinguished."""
         self.columns, self.rows, self.farthest = columns, rows, farthest
-        self.stride = -(-columns // LARGEST) * LARGEST
-        self.keys = np.full((-(-rows // LARGEST) * LARGEST, self.stride), EMPTY, np.int64)
+        self.stride = -(-columns // LARGEST_RECTANGLE) * LARGEST_RECTANGLE
+        self.keys = np.full((-(-rows // LARGEST_RECTANGLE) * LARGEST_RECTANGLE, self.stride), EMPTY, np.int64)
         # Pixels beyond the picture hide nothing, and nothing shows there.
         self.keys[rows:], self.keys[:, columns:] = np.iinfo(np.int64).max, np.iinfo(np.int64).max
         self.back = span[0]
@@ -167,10 +167,10 @@ class _Buffer:
         """Note up to which depth each tile of each size is filled."""
         if self.farthest:
             return
-        shape = self.keys.shape[0] // TILE, TILE, self.stride
-        filled = self.keys.reshape(shape).min(axis=1).reshape(shape[0], -1, TILE).min(axis=2)
+        shape = self.keys.shape[0] // SMALLEST_TILE, SMALLEST_TILE, self.stride
+        filled = self.keys.reshape(shape).min(axis=1).reshape(shape[0], -1, SMALLEST_TILE).min(axis=2)
         self.filled = [filled >> INDEX_BITS]
-        for _ in range(LEVELS - 1):
+        for _ in range(TILE_SIZES - 1):
             finer = np.minimum(self.filled[-1][::2], self.filled[-1][1::2])
             self.filled.append(np.minimum(finer[:, ::2], finer[:, 1::2]))
 
@@ -184,10 +184,14 @@ class _Buffer:
         if self.farthest:
             return np.ones(len(some.solid), bool)
         near, hidden = self.depth(some.near), np.zeros(len(some.solid), bool)
-        level = np.ceil(np.log2(np.maximum(some.columns, some.rows) / TILE)).clip(0, LEVELS - 1).astype(int)
+        level = (
+            np.ceil(np.log2(np.maximum(some.columns, some.rows) / SMALLEST_TILE))
+            .clip(0, TILE_SIZES - 1)
+            .astype(int)
+        )
         for k, filled in enumerate(self.filled):
             own = np.flatnonzero(level == k)
-            side = TILE << k
+            side = SMALLEST_TILE << k
             left, right = some.column[own] // side, (some.column + some.columns - 1)[own] // side
             low, high = some.row[own] // side, (some.row + some.rows - 1)[own] // side
             least = np.minimum(
@@ -200,13 +204,16 @@ class _Buffer:
     def add(self, group: Solids, some: _Rectangles, first: int, planes: Planes) -> None:
         """Add the solids of a group in rectangles. first : index of its first solid."""
         some = some.where(self.open(some))
-        wide, tall = np.searchsorted(SIDES, some.columns), np.searchsorted(SIDES, some.rows)
-        kind = wide * len(SIDES) + tall
+        wide, tall = (
+            np.searchsorted(RECTANGLE_SIDES, some.columns),
+            np.searchsorted(RECTANGLE_SIDES, some.rows),
+        )
+        kind = wide * len(RECTANGLE_SIDES) + tall
         order = np.argsort(kind, kind="stable")
         for members in np.split(order, np.flatnonzero(np.diff(kind[order])) + 1):
             if not len(members):
                 continue
-            columns, rows = SIDES[wide[members[0]]], SIDES[tall[members[0]]]
+            columns, rows = RECTANGLE_SIDES[wide[members[0]]], RECTANGLE_SIDES[tall[members[0]]]
             at_once = max(1, PIXELS_AT_ONCE // int(columns * rows))
             for begin in range(0, len(members), at_once):
                 self._fill(group, some.where(members[begin : begin + at_once]), columns, rows, first, planes)
