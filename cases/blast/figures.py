@@ -20,15 +20,16 @@ from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.common.runs import sound
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frame, Frames, frames
-from tisim.plotting.cloud import common, corners, directions, panel
-from tisim.plotting.facets import PROJECTION
+from tisim.plotting.cloud import directions, panel
+from tisim.plotting.scenery import window
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
+from tisim.rendering.camera import USUAL_CAMERA, Window
 from tisim.scene.initial_state import Arrays
 
 SEQUENCE_FRAMES = 6
 """Number of frames in a sequence."""
-NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
-"""The blast has no box and no gravity."""
+NO_GRAVITY = np.zeros(3)
+"""The blast has no gravity."""
 PATHS = 40
 """Number of particles whose paths are drawn."""
 RUNS = {
@@ -96,11 +97,11 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 def sequence(chosen: Sequence[Frame]) -> Figure:
     """Return the cloud at the chosen times, all on one scale, as in Z16 figures 5 to 9."""
     figure = empty(10.4, 7.2)
-    square = common([frame.arrays for frame in chosen], NO_BOX)
+    part = window([frame.arrays for frame in chosen])
     axes = figure.subplots(2, 3)
     for axis, frame in zip(axes.flat, chosen, strict=True):
-        snapshot(axis, frame.arrays, square)
-        directions(axis, square, NO_GRAVITY)
+        snapshot(axis, frame.arrays, part)
+        directions(axis, part, NO_GRAVITY)
         axis.set_title(f"t = {1e3 * frame.time:.0f} ms")
     letters(axes.flat)
     return figure
@@ -109,14 +110,16 @@ def sequence(chosen: Sequence[Frame]) -> Figure:
 def velocities(chosen: Sequence[Frame]) -> Figure:
     """Draw velocity vectors at the positions of the particles, all on one scale (Z16 Fig. 6, left)."""
     figure = empty(10.4, 7.2)
-    left, bottom, side = common([frame.arrays for frame in chosen], NO_BOX)
+    left, bottom, side, _ = window([frame.arrays for frame in chosen])
     fastest = max(np.linalg.norm(frame.arrays["velocity"], axis=1).max() for frame in chosen)
     # The longest arrow is an eighth of the picture, so a margin is added for it.
     left, bottom, side = left - side / 8, bottom - side / 8, 1.25 * side
+    part = Window(left, bottom, side, side)
     scale = 8.0 * fastest / side
     axes = figure.subplots(2, 3)
     for axis, frame in zip(axes.flat, chosen, strict=True):
-        (x, y), (u, v) = ((frame.arrays[name] @ PROJECTION)[:, :2].T for name in ("position", "velocity"))
+        seen = {name: USUAL_CAMERA.project(frame.arrays[name]) for name in ("position", "velocity")}
+        (x, y), (u, v) = (seen[name][:, :2].T for name in ("position", "velocity"))
         axis.quiver(
             x,
             y,
@@ -130,16 +133,16 @@ def velocities(chosen: Sequence[Frame]) -> Figure:
             alpha=0.6,
         )
         axis.set(xlim=(left, left + side), ylim=(bottom, bottom + side), aspect="equal", xticks=[], yticks=[])
-        directions(axis, (left, bottom, side), NO_GRAVITY)
+        directions(axis, part, NO_GRAVITY)
         axis.set_title(f"t = {1e3 * frame.time:.0f} ms")
     figure.suptitle(f"longest arrow: {fastest:.3g} m/s", fontsize=10)
     letters(axes.flat)
     return figure
 
 
-def snapshot(axis: Axes, state: Arrays, square: tuple[float, float, float]) -> None:
-    """Draw a state within a square: left, bottom and side, m."""
-    panel(axis, state, square, NO_BOX)
+def snapshot(axis: Axes, state: Arrays, part: Window) -> None:
+    """Draw a state within a window."""
+    panel(axis, state, part)
 
 
 def envelope(history: BlastHistory) -> Figure:
@@ -204,13 +207,13 @@ def beside(histories: Mapping[str, BlastHistory], ends: Mapping[str, Frame]) -> 
     """Draw the clouds at the end on one scale, and their half axes and contacts over time."""
     figure = empty(11.6, 6.4)
     grid = figure.add_gridspec(2, 15, height_ratios=(0.75, 1.0))
-    square = common([frame.arrays for frame in ends.values()], NO_BOX)
+    part = window([frame.arrays for frame in ends.values()])
     for k, (name, frame) in enumerate(ends.items()):
         axis = figure.add_subplot(grid[0, 3 * k : 3 * k + 3])
-        snapshot(axis, frame.arrays, square)
+        snapshot(axis, frame.arrays, part)
         axis.set_title(RUNS[name].replace(" (", "\n(").replace("near field ", "near field\n"))
     # The last panel has space for the axes.
-    directions(figure.axes[-1], square, NO_GRAVITY, share=0.12)
+    directions(figure.axes[-1], part, NO_GRAVITY, share=0.12)
     along, across, touching = (figure.add_subplot(grid[1, 5 * k : 5 * k + 5]) for k in range(3))
     colours = ("0.45", "#4477aa", "#228833", "#cc6677", "#aa7733")
     for (name, history), colour in zip(histories.items(), colours, strict=False):

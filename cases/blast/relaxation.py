@@ -17,10 +17,11 @@ from matplotlib.figure import Figure
 
 from tisim import MeasureSeries, Simulation
 from tisim.cases.blast import scene as blast
-from tisim.cases.blast.figures import NO_BOX, NO_GRAVITY, snapshot
+from tisim.cases.blast.figures import NO_GRAVITY, snapshot
 from tisim.cases.blast.relaxed_ball import BLASTS, Relaxation, mean, relaxing, study, tables
 from tisim.operators import AtRest
-from tisim.plotting.cloud import common, directions
+from tisim.plotting.cloud import directions
+from tisim.plotting.scenery import window
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 RANDOM, RELAXED = "random", "relaxed, neighbours"
@@ -47,12 +48,12 @@ def relaxation_figure(found: Relaxation) -> Figure:
     tops = []
     for k, (state, title) in enumerate(zip((*before, *after), titles, strict=True)):
         axis = figure.add_subplot(upper[k])
-        square = common(before if k < 2 else after, NO_BOX)
-        snapshot(axis, state, square)
+        part = window(before if k < 2 else after)
+        snapshot(axis, state, part)
         axis.set_title(title)
         tops.append(axis)
         if k % 2:
-            directions(axis, square, NO_GRAVITY, share=0.1)
+            directions(axis, part, NO_GRAVITY, share=0.1)
     residuals, kinds, energies = (figure.add_subplot(lower[k]) for k in range(3))
     history(residuals, found.number)
     by_kind(kinds, found)

@@ -13,12 +13,14 @@ from tisim.cases.coalescence import published, regime
 from tisim.cases.coalescence.runs import SEEDS, CloudRun, clouds, of_all_magnetisations, of_magnetisation
 from tisim.cases.coalescence.scene import SIZES
 from tisim.cases.common.csv_tables import csv_text
-from tisim.cases.common.rubble_pile import clusters_of, part
+from tisim.cases.common.rubble_pile import clusters_of
 from tisim.cases.common.two_spheres import attraction
 from tisim.engine.batches import Progress
-from tisim.plotting.cloud import common, corners, directions, panel, project
+from tisim.plotting.cloud import directions, panel
 from tisim.plotting.clusters import cluster_colours
+from tisim.plotting.scenery import window
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
+from tisim.rendering.camera import Window
 from tisim.scene.initial_state import Arrays
 
 SHELLS = 2
@@ -26,8 +28,8 @@ SHELLS = 2
 of more shells have no cells within the asteroid."""
 SEMI_AXES = ("semi_major_axis_m", "semi_intermediate_axis_m", "semi_minor_axis_m")
 """Column headings of the semi-axes of the bounding ellipsoid."""
-NO_BOX, NO_GRAVITY = corners(None, None), np.zeros(3)
-"""Clouds have no box and no gravity."""
+NO_GRAVITY = np.zeros(3)
+"""Clouds have no uniform gravity."""
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
@@ -90,25 +92,21 @@ def asteroids(runs: Sequence[CloudRun]) -> Figure:
     axes = figure.subplots(1, len(runs))
     grains = [one.asteroid.grains for one in runs]
     centred = [moved(one, one) for one in grains]
-    square = common(centred, NO_BOX)
+    part = window(centred)
     for axis, one, pile in zip(axes, runs, grains, strict=True):
-        close_up(axis, one.end, pile, square)
-        directions(axis, square, NO_GRAVITY)
+        close_up(axis, one.end, pile, part)
+        directions(axis, part, NO_GRAVITY)
         axis.set_title(f"{one.magnetisation:g} A/m: {len(pile['mass'])} of {len(one.end['mass'])} grains")
     letters(axes)
     return figure
 
 
-def close_up(axis: Axes, state: Arrays, grains: Arrays, square: tuple[float, float, float]) -> None:
-    """Draw the grains of a state within a square, coloured by cluster.
+def close_up(axis: Axes, state: Arrays, grains: Arrays, part: Window) -> None:
+    """Draw the grains of a state within a window, coloured by cluster.
 
-    The square is centred on the centre of mass of ``grains``.
+    The window is relative to the centre of mass of ``grains``.
     """
-    left, bottom, side = square
-    centred, colours = moved(state, grains), cluster_colours(clusters_of(state))
-    right_up = project(centred["position"])[:, :2] - (left, bottom)
-    inside = np.all((right_up > 0) & (right_up < side), axis=1)
-    panel(axis, part(centred, inside), square, NO_BOX, colours[inside])
+    panel(axis, moved(state, grains), part, colour=cluster_colours(clusters_of(state)))
 
 
 def moved(state: Arrays, grains: Arrays) -> Arrays:

@@ -18,14 +18,14 @@ from matplotlib.figure import Figure
 
 from tisim.analysis import Mean
 from tisim.cases.coalescence import published
-from tisim.cases.coalescence.figures import NO_BOX, close_up, moved
+from tisim.cases.coalescence.figures import close_up, moved
 from tisim.cases.coalescence.regime import spin_when_packed
 from tisim.cases.coalescence.runs import CloudRun, clouds, of_magnetisation
 from tisim.cases.coalescence.scene import DEFAULT
 from tisim.cases.common.rubble_pile import critical_spin
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.errors import must
-from tisim.plotting.cloud import common
+from tisim.plotting.scenery import window
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain
 
 ROTATED_STARTS = 4
@@ -127,10 +127,10 @@ def picture(found: Sequence[Rotated]) -> Figure:
     axes = drawn.subplots(len(published.MAGNETISATIONS), len(found), squeeze=False)
     shown = [[of_magnetisation(one.runs, m)[0] for one in found] for m in published.MAGNETISATIONS]
     piles = [[run.asteroid.grains for run in row] for row in shown]
-    square = common([moved(pile, pile) for row in piles for pile in row], NO_BOX)
+    part = window([moved(pile, pile) for row in piles for pile in row])
     for row, runs, grains, m in zip(axes, shown, piles, published.MAGNETISATIONS, strict=True):
         for axis, run, pile, one in zip(row, runs, grains, found, strict=True):
-            close_up(axis, run.end, pile, square)
+            close_up(axis, run.end, pile, part)
             axis.set_title(f"{m:g} A/m, {1e6 * rotation_here(one.printed):.0f} µrad/s", fontsize=9)
     ratios = beside.subplots()
     _ratios(ratios, found)

@@ -4,7 +4,6 @@ Each is run from several random starts. The rate of discharge is compared with B
 sqrt(g) (D - k d)^(5/2), by a straight line through W^(2/5): its slope gives C and its zero gives k.
 """
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +20,8 @@ from tisim.cases.common.runs import sound
 from tisim.cases.granular_bench.measures import discharge, heap, repose
 from tisim.cases.granular_bench.scene import DENSITY, DIAMETER, NATURAL, scene
 from tisim.engine.batches import Progress
-from tisim.plotting.cloud import common, corners, panel, walls_at
+from tisim.plotting.cloud import panel
+from tisim.plotting.scenery import scenery, window
 from tisim.plotting.style import empty, letters, plain
 
 VALUES = {
@@ -126,11 +126,10 @@ def bed_figure(found: Sequence[Bed]) -> Figure:
     chosen = [next(one for one in found if (one.what, one.value) == key) for key in SHOWN]
     firsts = [one.results[0] for one in chosen]
     states = [one.state for one in firsts]
-    walls = [walls_at(one.scene, states, one.time) for one in firsts]
-    # No box: the silo stands in open space.
-    square = common(states, np.vstack([corners(None, None), *itertools.chain(*walls)]))
-    for axis, one, state, lines in zip((first, second, third), chosen, states, walls, strict=True):
-        panel(axis, state, square, corners(None, None), walls=lines)
+    silos = [scenery(one.scene, states, one.time, one.measures) for one in firsts]
+    part = window(states, silos)
+    for axis, one, state, silo in zip((first, second, third), chosen, states, silos, strict=True):
+        panel(axis, state, part, silo)
         angle = "no heap" if np.isnan(one.angle.value) else f"{one.angle.value:.0f} degrees"
         axis.set_title(f"{one.what.replace('_', ' ')} {one.value:g}: {angle}")
     for k, what in enumerate(NATURAL):

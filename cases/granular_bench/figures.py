@@ -15,7 +15,8 @@ from tisim.cases.granular_bench.scene import BED, DIAMETER, SIZES
 from tisim.cases.granular_bench.shear_cell import CELL_SIDES, ShearedBed, expected_ratio, sheared_beds
 from tisim.engine.batches import Progress
 from tisim.errors import must
-from tisim.plotting.cloud import common, corners, panel
+from tisim.plotting.cloud import panel
+from tisim.plotting.scenery import box_scenery, window
 from tisim.plotting.style import TIME, empty, letters, plain
 
 FRACTIONS = (0.45, 0.49, 0.52, 0.54, 0.56, 0.57, 0.58)
@@ -78,8 +79,8 @@ def shear_figure(beds: Sequence[ShearedBed]) -> Figure:
 def sheared_grains(axis: Axes, bed: ShearedBed) -> None:
     """Draw the grains of a cell and of its walls, coloured by their velocity along the walls."""
     part = bed.state["velocity"][:, 0] / bed.wall_speed
-    box = corners(np.array([0.0, 0.0, -DIAMETER]), np.array([*CELL_SIDES, bed.gap + DIAMETER]))
-    panel(axis, bed.state, common([bed.state], box), box, TIME(part)[:, :3])
+    box = box_scenery(np.array([0.0, 0.0, -DIAMETER]), np.array([*CELL_SIDES, bed.gap + DIAMETER]))
+    panel(axis, bed.state, window([bed.state], [box]), box, TIME(part)[:, :3])
     axis.set_title(f"grains between rough walls, I = {bed.inertial_number:.2g}")
     bar = axis.figure.colorbar(ScalarMappable(cmap=TIME), ax=axis, shrink=0.72, pad=0.01)
     bar.set_label("velocity over wall velocity")

@@ -27,7 +27,8 @@ from tisim.cases.mrf_shear.measures import order
 from tisim.cases.mrf_shear.scene import RATES, SIZES
 from tisim.engine.batches import Progress
 from tisim.errors import must
-from tisim.plotting.cloud import corners, panel, view
+from tisim.plotting.cloud import panel
+from tisim.plotting.scenery import box_scenery, window
 from tisim.plotting.style import empty, letters, plain, si
 
 STARTS = 3
@@ -122,12 +123,12 @@ def chain_figure(chained: Result, sheared: Result) -> Figure:
         (f"sheared, {si(sheared.time, 's')}", sheared.state),
     )
     domain = sheared.scene.domain
-    box = corners(*domain.bounds())
-    square = view(chained.start, box)
+    box = box_scenery(*domain.bounds())
+    part = window([chained.start], [box])
     axes = figure.subplots(1, 3)
     for axis, (heading, state) in zip(axes, states, strict=True):
         known = {name: state[name] for name in ("position", "radius")}
-        panel(axis, known, square, box, None)
+        panel(axis, known, part, box)
         chains = order(state, domain)
         axis.set_title(f"{heading}: contacts {chains.contacts:.1f}, order {chains.alignment:.2f}")
     letters(axes, 9)

@@ -8,15 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from scipy.spatial.transform import Rotation
 
 from tisim import Result, Scene
-from tisim.analysis import PackedBodies
 from tisim.cases.packed_filter.measures import matrix_box
 from tisim.io.reader import Frames
-from tisim.plotting.bodies import draw_bodies
+from tisim.plotting.image import draw_solids
 from tisim.plotting.style import TIME, empty, letters, plain
-from tisim.shapes import SpherocylinderShape, SuperquadricShape
+from tisim.rendering.solids import DrawnCylinders, DrawnRods, DrawnSpheres
 from tisim.sources import MagneticCylinders, sample
 from tisim.sources.base import Source
 
@@ -26,8 +24,6 @@ LINE_STEP = 0.25
 """Length of a piece of a streamline, D."""
 THIN, DOT = 0.06, 0.2
 """Diameters of streamlines and of captured colloids in pictures, D."""
-FLAT_ENDS = (2.0, 2.0, 20.0)
-"""Exponents of the superquadric that a cylinder is drawn as."""
 FLOW = "flow_velocity"
 STEEL, WATER = (0.82, 0.83, 0.85), (0.35, 0.62, 0.85)
 """Colours of fibres and streamlines."""
@@ -68,32 +64,24 @@ def draw_filter(
     unit, norm = 2 * fibres[0].radius, Normalize(0.0, latest if latest > 0 else end)
     lines = streamlines(scene, unit)
     middle, along = (lines[1:] + lines[:-1]) / 2, lines[1:] - lines[:-1]
-    shapes = (
-        SuperquadricShape(semi_axes=(unit / 2, unit / 2, fibres[0].length / 2), exponents=FLAT_ENDS),
-        SpherocylinderShape(length=LINE_STEP * unit, diameter=THIN * unit),
-        SpherocylinderShape(length=0.0, diameter=DOT * unit),
-    )
-    groups = (
-        (centre[own], np.array([one.direction for one in fibres]), np.tile(STEEL, (len(fibres), 1))),
-        (middle.reshape(-1, 3), along.reshape(-1, 3), np.tile(WATER, (middle[..., 0].size, 1))),
-        (
-            state["position"][held],
-            np.tile([0.0, 0.0, 1.0], (held.sum(), 1)),
-            TIME(norm(state["captured_at"][held]))[:, :3],
+    length = np.linalg.norm(along, axis=-1).ravel()
+    solids = (
+        DrawnCylinders(
+            centre=centre[own], colour=np.tile(STEEL, (len(fibres), 1)),
+            axis=np.array([one.direction for one in fibres]),
+            half=np.array([one.length / 2 for one in fibres]), radius=np.full(len(fibres), unit / 2),
         ),
-    )
-    place, axes, colours = (np.concatenate([group[k] for group in groups]) for k in range(3))
-    packing = PackedBodies(
-        position=place,
-        orientation=turns_to(axes),
-        shape=np.repeat([0, 1, 2], [len(group[0]) for group in groups]),
-        scale=np.ones(len(place)),
-        shapes=shapes,
-        low=low,
-        high=high,
-        periodic=(False, False, False),
-    )
-    draw_bodies(axis, packing, colours)
+        DrawnRods(
+            centre=middle.reshape(-1, 3), colour=np.tile(WATER, (length.size, 1)),
+            axis=along.reshape(-1, 3) / np.maximum(length, 1e-300)[:, None], half=length / 2,
+            radius=np.full(length.size, THIN * unit / 2),
+        ),
+        DrawnSpheres(
+            centre=state["position"][held], colour=TIME(norm(state["captured_at"][held]))[:, :3],
+            radius=np.full(held.sum(), DOT * unit / 2),
+        ),
+    )  # fmt: skip
+    draw_solids(axis, solids)
     axis.set_title(f"{held.sum()} of {len(held)} colloids are captured", fontsize=10)
     figure.colorbar(ScalarMappable(norm, TIME), ax=axis, shrink=0.6, label="time of capture (s)")
 
@@ -118,14 +106,6 @@ def streamlines(scene: Scene, unit: float) -> np.ndarray:
 def _direction(scene: Scene, place: np.ndarray) -> np.ndarray:
     velocity, _ = sample(scene.effects, FLOW, place)
     return np.asarray(velocity / np.maximum(np.linalg.norm(velocity, axis=1), 1e-300)[:, None])
-
-
-def turns_to(axes: np.ndarray) -> np.ndarray:
-    """Return unit quaternions w, x, y, z that turn z to directions of any length, shape (n, 4)."""
-    unit = axes / np.linalg.norm(axes, axis=1)[:, None]
-    polar, azimuth = np.arccos(np.clip(unit[:, 2], -1, 1)), np.arctan2(unit[:, 1], unit[:, 0])
-    turns = Rotation.from_euler("ZY", np.stack([azimuth, polar], axis=1))
-    return np.asarray(turns.as_quat(scalar_first=True))
 
 
 def course(axis: Axes, states: list[Mapping[str, np.ndarray]], times: np.ndarray) -> None:

@@ -7,15 +7,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tisim.cases.coalescence import published
-from tisim.cases.coalescence.figures import NO_BOX, NO_GRAVITY, SEMI_AXES, close_up, moved
+from tisim.cases.coalescence.figures import NO_GRAVITY, SEMI_AXES, close_up, moved
 from tisim.cases.coalescence.runs import of_all_magnetisations
 from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.common.rubble_pile import critical_spin
 from tisim.cases.spin_up.scene import SIZES
 from tisim.cases.spin_up.stages import DISRUPTION, SEEDS, SpinStep, SpinUp, spin_ups
 from tisim.engine.batches import Progress
-from tisim.plotting.cloud import directions, view
+from tisim.plotting.cloud import directions
+from tisim.plotting.scenery import window
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
+from tisim.rendering.camera import Window
 
 SHOWN = (0.0, 6e-4, 8e-4)
 """Angular velocities after whose steps piles are drawn, rad/s."""
@@ -76,15 +78,15 @@ def piles(runs: Sequence[SpinUp]) -> Figure:
     for row, m in zip(axes, published.MAGNETISATIONS, strict=True):
         run = next(one for one in runs if one.magnetisation == m)
         pile = run.steps[0].asteroid.grains
-        left, bottom, side = view(moved(pile, pile), NO_BOX)
+        left, bottom, side, _ = window([moved(pile, pile)])
         margin = (WIDER - 1) / 2 * side
-        square = (left - margin, bottom - margin, WIDER * side)
+        part = Window(left - margin, bottom - margin, WIDER * side, WIDER * side)
         for axis, rate in zip(row, SHOWN, strict=True):
             step = run.at(rate)
             # Centred on all grains: a view around the largest fragment would cut off other fragments.
-            close_up(axis, step.state, step.state, square)
+            close_up(axis, step.state, step.state, part)
             axis.set_title(f"{m:g} A/m, {1e6 * step.rate:.0f} µrad/s")
-    directions(axes[0, 0], square, NO_GRAVITY)
+    directions(axes[0, 0], part, NO_GRAVITY)
     letters(axes.flat)
     return figure
 

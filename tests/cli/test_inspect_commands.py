@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from tests.files.full_disk import files_of_at_most
 from tests.files.test_growing_hdf5 import STILL
+from tests.files.test_growing_hdf5 import frame as grown
 from tisim import Simulation
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
@@ -239,3 +240,53 @@ def test_wrong_input(tisim, toml, tmp_path):
         assert (code, out) == (2, "")
         assert message in err
     assert [path.name for path in tmp_path.iterdir()] == [toml]
+
+
+def test_view_crop_clip_and_colour_change_the_pictures(tisim, toml, tmp_path):
+    assert tisim("run", toml, "--frames", 2)[0] == 0
+    folder = tmp_path / "out" / "flow"
+    pictures = {}
+    for option in (
+        (),
+        ("--colour", "speed"),
+        ("--view", "30,60"),
+        ("--crop", "0,0.5,0,0.5"),
+        ("--clip", "z<0"),
+    ):
+        assert tisim("plot", folder, "--out", "p", *option) == (0, "p/cloud.png\np/time_series.png\n", "")
+        pictures[option] = (tmp_path / "p" / "cloud.png").read_bytes()
+    assert len(set(pictures.values())) == 5
+    movies = {}
+    for option in ((), ("--color", "radius", "--clip", "z<0", "--clip", "x>-1e-3")):
+        assert tisim("movie", folder, "--to", "m/a.gif", *option)[0] == 0
+        movies[option] = (tmp_path / "m" / "a.gif").read_bytes()
+    assert len(set(movies.values())) == 2
+    assert tisim("export", folder, "--fields", "radius, mass", "--format", "xyz", "--out", "x")[0] == 0
+    assert (
+        "Properties=species:S:1:pos:R:3:mass:R:1:radius:R:1 " in (tmp_path / "x/trajectory.xyz").read_text()
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("plot", "--colour", "heat"), "colour must be one of "),
+        (("plot", "--view", "1"), "view must be 2 numbers, azimuth,elevation in degrees; received '1'"),
+        (("movie", "--crop", "1,0,0,1"), "crop must be 0 <= left < right <= 1"),
+        (
+            ("movie", "--clip", "x"),
+            "clip must be a part of space that is kept, such as y<0.01 (m); received 'x'",
+        ),
+        (("export", "--fields", "heat"), "fields must be some of "),
+        (("export", "--fields", "mass", "--format", "h5md"), "fields must be chosen for vtk or xyz, as h5md"),
+    ],
+)
+def test_pictures_that_cannot_be_drawn_as_asked_are_refused(tisim, tmp_path, words, message):
+    with Trajectory(tmp_path / "t.h5", [STILL]) as trajectory:
+        trajectory.write(0, grown(3))
+        trajectory.write(0, grown(4))
+    command, *more = words
+    code, out, err = tisim(command, "t.h5", *more)
+    assert (code, out) == (2, "")
+    assert err.startswith(message)
+    assert [path.name for path in tmp_path.iterdir()] == ["t.h5"]

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 import tisim
+from tests.effects.contact.grains import USUAL
 from tests.files.test_growing_hdf5 import STILL
 from tests.files.test_growing_hdf5 import frame as grown
 from tests.scenes import flow, scene
-from tisim import InputError, Recording
+from tisim import InputError, Material, Recording, geometry
+from tisim.effects import Granular, Servo, Translation, Walls
 from tisim.io.export import export, file_names
 from tisim.io.reader import frames
 from tisim.io.run_folder import RunFolder, write
@@ -166,6 +168,94 @@ def test_a_result_has_its_start_and_end(tmp_path):
         assert [frame.time for frame in copy] == [0.0, result.time]
         assert [frame.arrays["position"][0, 0] for frame in copy] == [0.0, pytest.approx(3e-3)]
         assert [frame.arrays["id"].tolist() for frame in copy] == [[0], [0]]
+
+
+DISC = geometry.Disc(centre=(0, 0, -1), radius=0.5)
+
+
+def walled(tmp_path, *walls):
+    """A trajectory with three frames of two grains of different materials among walls."""
+    materials = {"steel": Material(**USUAL), "rubber": Material(**USUAL)}
+    made = scene(
+        [(0, 0, 0), (0.3, 0, 0)], np.zeros((2, 3)), (Granular(), *walls), 0.1, dt=1e-4, steps=2,
+        materials=materials, material=["steel", "rubber"],
+    )  # fmt: skip
+    tisim.run(made, record=Recording(tmp_path / "w.h5", frames=2))
+    return tmp_path / "w.h5"
+
+
+def files_by_part(path):
+    """Names of the files of a .pvd by part, in order of time."""
+    datasets = ElementTree.parse(path).findall("Collection/DataSet")
+    return [[one.get("file") for one in datasets if one.get("part") == part] for part in "01"]
+
+
+def test_walls_are_triangles_in_place_at_each_frame(tmp_path):
+    lift = Walls(name="lift", discs=[DISC], motion=Translation(velocity=(0, 0, 100.0)), material="rubber")
+    floor = Walls(name="floor", planes=[geometry.Plane(point=(0, 0, -2))])
+    file = walled(tmp_path, lift, floor)
+    grains, walls = files_by_part(export(file, "vtk", tmp_path))
+    assert walls == [f"w_walls_{k:05d}.vtu" for k in range(3)]
+    assert set(file_names(file, "vtk")) == {"w.pvd", *grains, *walls}
+    for time, name in zip((0, 1e-4, 2e-4), walls, strict=True):
+        mesh = meshio.read(tmp_path / name)
+        (cells,) = mesh.cells
+        assert cells.type == "triangle"
+        wall, material = (mesh.cell_data[key][0] for key in ("wall", "material"))
+        assert material.tolist() == [1 if k == 0 else 0 for k in wall]
+        for k, height in ((0, -1 + 100 * time), (1, -2)):
+            corners = mesh.points[cells.data[wall == k]]
+            np.testing.assert_allclose(corners[..., 2], height, atol=1e-12)
+        sides = mesh.points[cells.data[wall == 0]]
+        area = (
+            np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1).sum() / 2
+        )
+        assert area == pytest.approx(np.pi / 4, rel=2e-3)
+
+
+def test_walls_at_rest_have_one_file(tmp_path):
+    file = walled(tmp_path, Walls(discs=[DISC]))
+    _, walls = files_by_part(export(file, "vtk", tmp_path))
+    assert walls == ["w_walls_00000.vtu"] * 3
+    assert [name for name in file_names(file, "vtk") if "walls" in name] == ["w_walls_00000.vtu"]
+    assert sorted(path.name for path in tmp_path.glob("*walls*")) == ["w_walls_00000.vtu"]
+
+
+def test_a_body_that_forces_move_is_where_its_travel_says(tmp_path):
+    lid = Walls(name="lid", discs=[DISC], motion=Servo(force=1.0, limit=100.0))
+    file = walled(tmp_path, lid)
+    _, walls = files_by_part(export(file, "vtk", tmp_path))
+    heights = [meshio.read(tmp_path / name).points[:, 2].mean() for name in walls]
+    travel = [frame.measures["lid_travel"] for frame in every_frame(file)]
+    np.testing.assert_allclose(heights, -1 - np.array(travel), atol=1e-9)
+    assert heights[-1] < -1.009
+
+
+def test_materials_are_species(tmp_path):
+    file = walled(tmp_path, Walls(discs=[DISC]))
+    lines = export(file, "xyz", tmp_path).read_text().splitlines()
+    assert [line.split()[0] for line in lines[2:4]] == ["steel", "rubber"]
+    # Without the material ASE can read the file, which takes no species but elements.
+    read = ase.io.read(export(file, "xyz", tmp_path, fields=["mass"]), index=":", format="extxyz")
+    assert [set(atoms.symbols) for atoms in read] == [{"X"}] * 3
+
+
+def test_chosen_fields_alone_are_written(file, tmp_path):
+    (atoms, *_) = ase.io.read(export(file, "xyz", tmp_path, fields=["radius", "velocity"]), ":", "extxyz")
+    assert atoms.arrays.keys() - {"numbers", "positions"} == {"radius", "velo"}
+    assert atoms.info["Units"] == "pos:m velo:m/s radius:m"
+    export(file, "vtk", tmp_path, fields=["mass"])
+    mesh = meshio.read(tmp_path / "flow_00000.vtu")
+    assert mesh.point_data.keys() == {"mass"}
+    np.testing.assert_array_equal(mesh.points, every_frame(file)[0].arrays["position"])
+
+
+def test_fields_that_cannot_be_written_are_refused(file, tmp_path):
+    with pytest.raises(InputError, match=r"fields must be some of .*mass.*; received 'mas'"):
+        export(file, "vtk", tmp_path, fields=["mas"])
+    with pytest.raises(InputError, match="fields must be chosen for vtk or xyz, as h5md is a copy"):
+        export(file, "h5md", tmp_path, fields=["mass"])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_other_formats_are_refused(file, tmp_path):

@@ -14,7 +14,7 @@ from tisim.files import output_folder
 from tisim.files.output_folder import MARKER, ensure_writable
 from tisim.io.run_folder import DATA, RUN_FILES, RunFolder, write
 from tisim.io.trajectory import Trajectory
-from tisim.plotting.cloud import PIXELS, _draw, cloud
+from tisim.plotting.cloud import cloud
 
 ONE = [(0.0, 0.0, 0.0)]
 SCENE = scene(ONE, ONE, dt=1e-6, steps=5)
@@ -168,25 +168,6 @@ def test_full_disk_leaves_no_result(result, tmp_path, monkeypatch):
     with pytest.raises(RunError, match="No space left on device"):
         write(result, RunFolder(tmp_path))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_spheres_have_their_true_size():
-    side, radius = 2.0, 0.3
-    image = _draw(np.array([[1.0, 1.0, 0.0]]), np.array([radius]), np.array([[1.0, 0.0, 0.0]]), side)
-    assert image.shape == (PIXELS // 2, PIXELS // 2, 4)
-    assert image[..., 3].mean() * side**2 == pytest.approx(np.pi * radius**2, rel=2e-3)
-    middle = image[PIXELS // 4, PIXELS // 4]
-    assert middle[0] > 0.5 > middle[1]
-
-
-def test_nearer_sphere_hides_the_farther():
-    place = np.array([[1.0, 1.0, 0.5], [1.0, 1.0, -0.5]])
-    colours = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-    for order in ([0, 1], [1, 0]):
-        image = _draw(place[order], np.array([0.2, 0.3])[order], colours[order], 2.0)
-        inside, rim = image[PIXELS // 4, PIXELS // 4], image[PIXELS // 4, PIXELS // 4 + PIXELS // 16]
-        assert inside[1] > inside[0]
-        assert rim[0] > rim[1]
 
 
 def test_one_grain_can_be_drawn():

@@ -7,8 +7,8 @@ from tests.scenes import scene
 from tisim.analysis import bounding_ellipsoid, fit_bingham, fit_biviscous, fit_herschel_bulkley, labels
 from tisim.effects import Tether
 from tisim.plotting.clusters import clusters
-from tisim.plotting.facets import PROJECTION
 from tisim.plotting.measures import chain_lengths, flow_curve, neighbours, profiles
+from tisim.rendering.camera import USUAL_CAMERA
 
 RATE = np.geomspace(1, 1000, 12)
 
@@ -75,7 +75,7 @@ def test_outlines_of_ellipsoid_and_hull_enclose_all_points(rng):
         ("bounding ellipsoid", around.centre + u * around.semi_axes @ around.axes),
         ("convex hull", (position[:, None] + 0.2 * u[None, :500]).reshape(-1, 3)),
     ):
-        seen = (points @ PROJECTION)[:, :2]
+        seen = USUAL_CAMERA.project(points)[:, :2]
         for angle in np.linspace(0, np.pi, 13):
             way = np.array([np.cos(angle), np.sin(angle)])
             assert (seen @ way).max() == pytest.approx((named[name] @ way).max(), abs=0.03)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from types import SimpleNamespace
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.animation import FFMpegWriter, PillowWriter
@@ -16,6 +17,7 @@ from tisim import Box, InputError, Open, Recording, ShearedBox
 from tisim.io.reader import Frames, frames
 from tisim.io.trajectory import Trajectory
 from tisim.plotting.cloud import start_and_end
+from tisim.plotting.look import Look
 from tisim.plotting.movie import movie
 from tisim.plotting.time_series import clouds, history, mark_missing, quantities
 
@@ -150,7 +152,8 @@ def test_start_and_end_are_on_one_scale_with_the_axes_of_space_and_gravity():
     """A cloud that expands tenfold in open space."""
     states = [{"position": k * np.eye(3), "radius": np.full(3, 0.1)} for k in (1.0, 10.0)]
     for effects, letters in (((), "xyz"), ((tisim.effects.Gravity(acceleration=(0, 0, -2.0)),), "xyzg")):
-        figure = start_and_end(states, (0.0, 1.0), SimpleNamespace(domain=Open(), effects=effects))
+        made = SimpleNamespace(domain=Open(), effects=effects, materials={})
+        figure = start_and_end(states, (0.0, 1.0), made)
         left, right = figure.axes
         assert left.get_xlim() == right.get_xlim()
         assert left.get_ylim() == right.get_ylim()
@@ -204,12 +207,33 @@ def test_the_note_of_an_interrupted_run_is_complete_and_covers_nothing(file, tmp
 
 def test_movies_that_cannot_be_made_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    monkeypatch.setattr("tisim.plotting.movie.FFMPEG", "absent_module")
     with frames(file) as trajectory:
         for name, rate, message in (
-            ("t.mp4", 20, r"movie must be a .gif if ffmpeg is not installed; received 't.mp4'"),
+            (
+                "t.mp4",
+                20,
+                r"movie must be a .gif, as there is no ffmpeg .*tisim\[movie\].*; received 't.mp4'",
+            ),
             ("t.avi", 20, r"movie must be a .gif or .mp4 file; received 't.avi'"),
             ("t.gif", 0, "frames a second must be 1 to 100; received 0"),
         ):
             with pytest.raises(InputError, match=message):
                 movie(trajectory, tmp_path / name, rate)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_mp4_is_written_by_the_ffmpeg_of_the_extra(file, tmp_path, monkeypatch):
+    """Also on a machine without ffmpeg; the film has all frames."""
+    carried = pytest.importorskip("imageio_ffmpeg")
+    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", "no-such-ffmpeg")
+    with frames(file) as trajectory:
+        movie(trajectory, tmp_path / "t.mp4", 10, look=Look.of("speed", "30,20"))
+    assert [path.name for path in tmp_path.iterdir()] == ["t.mp4"]
+    count, seconds = carried.count_frames_and_secs(str(tmp_path / "t.mp4"))
+    assert (count, seconds) == (5, pytest.approx(0.5))
+    reader = carried.read_frames(str(tmp_path / "t.mp4"))
+    width, height = next(reader)["size"]
+    pictures = [np.frombuffer(one, np.uint8).reshape(height, width, 3).astype(int) for one in reader]
+    assert all(np.abs(a - b).max() > 50 for a, b in itertools.pairwise(pictures))
+    assert matplotlib.rcParams["animation.ffmpeg_path"] == "no-such-ffmpeg"

@@ -1,4 +1,4 @@
-"""Outlines of walls in pictures lie on their shapes and follow their motions."""
+"""Walls in pictures and exports: triangles on their shapes, which follow the motions of bodies."""
 
 from types import SimpleNamespace
 
@@ -9,12 +9,13 @@ from tests.effects.contact.grains import USUAL
 from tests.scenes import scene
 from tisim import Material, geometry
 from tisim.effects import Fixed, Granular, Oscillation, Rotation, Servo, Translation, Walls
-from tisim.plotting.cloud import start_and_end
-from tisim.plotting.movie import walls_of_all
-from tisim.plotting.walls import outline, outlines, placed
+from tisim.effects.walls.placement import MARGIN, placed, placed_walls
+from tisim.geometry.tessellation import sharp_edges, tessellated
+from tisim.plotting.look import USUAL as USUAL_LOOK
+from tisim.plotting.movie import _scales
+from tisim.plotting.scenery import scenery
 
-TOWARDS = np.array([0.0, -0.8, 0.6])
-LOW, HIGH = np.zeros(3), np.ones(3)
+CORNERS = np.array([[0.0, 0, 0], [1, 1, 1]])
 MOTIONS = (
     Fixed(),
     Translation(velocity=(1.0, 2.0, 3.0)),
@@ -22,6 +23,7 @@ MOTIONS = (
     Oscillation(amplitude=(0.0, 0.1, 0.2), frequency=3.0, phase=0.5),
     Rotation(rate=(0.3, -1.0, 2.0), centre=(1.0, 0.5, 0.0)),
 )
+DISC = geometry.Disc(centre=(0.5, 0.5, 0), radius=0.5)
 
 
 def among(*walls):
@@ -29,6 +31,12 @@ def among(*walls):
     return scene(
         [[0.5] * 3], np.zeros((1, 3)), (Granular(), *walls), 0.1, materials={"grain": Material(**USUAL)}
     )
+
+
+def size(triangles):
+    """The total area of triangles, m^2."""
+    sides = triangles[:, 1:] - triangles[:, :1]
+    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
 
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: motion.kind())
@@ -59,62 +67,71 @@ def test_planes_end_at_each_other_and_around_the_grains():
     """A box without a lid: five rectangles, which extend slightly beyond the grains on the open side."""
     faces = [((0, 0, 0), axis) for axis in np.eye(3)] + [((1, 1, 1), -axis) for axis in np.eye(3)[:2]]
     planes = [geometry.Plane(point=point, normal=tuple(normal)) for point, normal in faces]
-    lines = outlines(among(Walls(planes=planes)), 0.0, LOW, HIGH, TOWARDS)
-    assert len(lines) == 5
-    points = np.concatenate(lines)
-    assert (points.min(axis=0), points.max(axis=0)) == (
-        pytest.approx([0, 0, 0], abs=1e-6), pytest.approx([1, 1, 1 + 0.1 * 3**0.5], abs=1e-6),
-    )  # fmt: skip
-    for (point, normal), line in zip(faces, lines, strict=True):
-        np.testing.assert_allclose((line - point) @ normal, 0, atol=1e-9)
-        assert len(line) == 5
-    assert outlines(among(Walls(planes=[geometry.Plane(point=(0, 0, -9))])), 0.0, LOW, HIGH, TOWARDS) == []
+    (body,) = placed_walls(among(Walls(planes=planes)).effects, 0.0, CORNERS)
+    points = body.triangles.reshape(-1, 3)
+    top = 1 + MARGIN * 3**0.5
+    np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], [[0, 0, 0], [1, 1, top]], atol=1e-6)
+    assert size(body.triangles) == pytest.approx(1 + 4 * top, rel=1e-6)
+    assert len(body.edges) == 20
+    far = Walls(planes=[geometry.Plane(point=(0, 0, -9))])
+    assert not len(placed_walls(among(far).effects, 0.0, CORNERS)[0].triangles)
 
 
-def test_rims_and_silhouettes_lie_on_their_shapes():
-    cylinder = geometry.CylindricalSurface(start=(0, 0, 0), end=(0, 0, 2), radius=0.5)
-    *rims, left, right = outline(cylinder, TOWARDS)
-    for rim, height in zip(rims, (0, 2), strict=True):
-        np.testing.assert_allclose(np.linalg.norm(rim[:, :2], axis=1), 0.5)
-        np.testing.assert_allclose(rim[:, 2], height, atol=1e-12)
-    # Seen from -y it ends at x = 0.5 on both sides.
-    np.testing.assert_allclose(sorted([left[0, 0], right[0, 0]]), [-0.5, 0.5])
-    (ring,) = outline(geometry.SphericalSurface(centre=(1, 2, 3), radius=0.3), TOWARDS)
-    np.testing.assert_allclose(np.linalg.norm(ring - [1, 2, 3], axis=1), 0.3)
-    np.testing.assert_allclose((ring - [1, 2, 3]) @ TOWARDS, 0, atol=1e-12)
-    assert len(outline(geometry.BoxSurface(high=(1, 2, 3)), TOWARDS)) == 12
-    cone = geometry.ConicalSurface(end=(0, 0, 1), start_radius=0.0, end_radius=1.0)
-    assert len(outline(cone, TOWARDS)) == 3
+@pytest.mark.parametrize(
+    ("shape", "area", "edges"),
+    [
+        (DISC, np.pi / 4, 2 * np.pi * 0.5),
+        (geometry.SphericalSurface(centre=(1, 2, 3), radius=0.3), 4 * np.pi * 0.09, 0.0),
+        (geometry.CylindricalSurface(start=(0, 0, 0), end=(1, 0, 2), radius=0.5), np.pi * 5**0.5, 2 * np.pi),
+        (geometry.CylindricalSurface(end=(0, 0, 2), radius=0.5, closed=True), 2.5 * np.pi, 2 * np.pi),
+        (geometry.ConicalSurface(end=(0, 0, 1), start_radius=0.0, end_radius=1.0), np.pi * 2**0.5, 2 * np.pi),
+        (geometry.BoxSurface(high=(1, 2, 3)), 22.0, 24.0),
+    ],
+)
+def test_triangles_lie_on_their_shapes(shape, area, edges):
+    """Their corners lie on the surface, and areas and lengths of sharp edges approach the true ones."""
+    triangles = tessellated(shape)
+    np.testing.assert_allclose(shape.distances(triangles.reshape(-1, 3)), 0, atol=1e-12)
+    assert size(triangles) == pytest.approx(area, rel=2e-3)
+    lines = sharp_edges(triangles)
+    assert np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum() == pytest.approx(edges, rel=2e-3)
+
+
+def test_edges_of_a_mesh_are_its_rims_and_folds():
     sheet = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1.0]])
     flat = geometry.TriangulatedSurface(vertices=sheet, faces=[(0, 1, 2), (0, 2, 3)])
-    assert len(outline(flat, TOWARDS)) == 4
+    assert len(sharp_edges(tessellated(flat))) == 4
     tent = geometry.TriangulatedSurface(vertices=sheet, faces=[(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
-    assert len(outline(tent, TOWARDS)) == 8
+    assert len(sharp_edges(tessellated(tent))) == 8
 
 
 def test_walls_in_a_picture_are_in_place():
-    """A moving disc is at another place at the end; walls moved by forces and distant walls are left out."""
-    disc = geometry.Disc(centre=(0.5, 0.5, 0), radius=0.5)
-    goes = Walls(name="goes", discs=[disc], motion=Translation(velocity=(0, 0, 0.4)))
+    """A moving disc is at another place at the end; a body moved by forces is where its travel says, and left
+    out if that is not known; distant walls are left out."""
     made = among(
-        goes,
-        Walls(name="lid", discs=[disc], motion=Servo(force=1.0, limit=0.1)),
+        Walls(name="goes", discs=[DISC], motion=Translation(velocity=(0, 0, 0.4))),
+        Walls(name="lid", discs=[DISC], motion=Servo(force=1.0, limit=0.1)),
         Walls(name="far", discs=[geometry.Disc(centre=(0, 0, 99), radius=1.0)]),
     )
-    (line,) = outlines(made, 1.0, LOW, HIGH, TOWARDS)
-    np.testing.assert_allclose(line[:, 2], 0.4)
     start = made.start()
-    figure = start_and_end((start, start), (0.0, 1.0), made)
-    heights = [axis.lines[0].get_ydata().mean() for axis in figure.axes[:2]]
-    assert len(figure.axes[0].lines) == len(start_and_end((start, start), (0, 1), among()).axes[0].lines) + 1
-    assert heights[1] > heights[0]
+    around = [start]
+    for time, measures, heights in (
+        (0.0, {}, [0.0, 0.0]), (1.0, {}, [0.4]), (1.0, {"lid_travel": 0.3}, [0.4, -0.3]),
+    ):  # fmt: skip
+        walls = scenery(made, around, time, measures).walls
+        np.testing.assert_allclose([one.corners[..., 2].mean() for one in walls], heights, atol=1e-12)
 
 
-def test_walls_in_a_movie_are_in_place_at_each_frame():
-    disc = geometry.Disc(centre=(0.5, 0.5, 0), radius=0.5)
-    shakes = Oscillation(amplitude=(0, 0, 0.4), frequency=1.0)
-    made = among(Walls(discs=[disc], motion=shakes))
-    frames = SimpleNamespace(scene=made, times=np.array([0.0, 0.25, 0.5, 1.0]))
-    heights = [line[:, 1].mean() for line in walls_of_all(frames, made.start())]
-    assert len(heights) == 4
-    assert heights[1] > max(heights[0], heights[2], heights[3]) + 0.1
+def test_the_window_of_a_movie_contains_walls_at_each_frame():
+    shakes = Oscillation(amplitude=(0, 0, 4.0), frequency=1.0)
+    made = among(Walls(discs=[DISC], motion=shakes))
+
+    class Seen(list):
+        scene, times, measures = made, np.array([0.0, 0.25, 0.5]), {}
+
+    frames = Seen([SimpleNamespace(arrays=made.start())] * 3)
+    _, _, part = _scales(frames, USUAL_LOOK)
+    still = Seen(frames[:1])
+    still.times = frames.times[:1]
+    _, _, less = _scales(still, USUAL_LOOK)
+    assert part.bottom + part.height > less.bottom + less.height + 3

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tisim.io.reader import Frames
+    from tisim.plotting.look import Look
 
 File = Annotated[
     Path,
@@ -46,6 +47,21 @@ OTHER_FOLDERS = {"search.h5": "a search", "cost.h5": "a study of costs"}
 """Files that mark folders without frames, each with the kind of the folder; such folders hold their own
 pictures."""
 World = Annotated[int, typer.Option(help="Index of the world in a batch, from 0.")]
+Colour = Annotated[
+    str | None,
+    typer.Option(
+        "--colour", "--color", metavar="FIELD",
+        help="Quantity that colours grains: material, radius, speed, or a recorded field.",
+    ),
+]  # fmt: skip
+View = Annotated[str, typer.Option(metavar="AZIMUTH,ELEVATION", help="Direction of the viewer in degrees.")]
+Crop = Annotated[
+    str, typer.Option(metavar="LEFT,RIGHT,BOTTOM,TOP", help="Part of the picture that is shown, 0 to 1.")
+]
+Clip = Annotated[
+    list[str] | None,
+    typer.Option(metavar="PART", help="Part of space that is drawn, in m, such as 'y<0.01'; repeatable."),
+]
 IntoFolder = Annotated[
     Path | None,
     typer.Option(
@@ -60,11 +76,15 @@ def plot(
     folder: IntoFolder = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
+    colour: Colour = None,
+    view: View = "",
+    crop: Crop = "",
+    clip: Clip = None,
 ) -> None:
     """Draw pictures of a run.
 
     They show the cloud, the time series of energy, centre of gravity and number of particles, the forces on
-    walls and driven groups, and more if the run is of a case.
+    walls and driven groups, and more if the run is of a case. The options are for the cloud.
     """
     from tisim.io.reader import frames
 
@@ -72,19 +92,21 @@ def plot(
     out_folder = folder or file.parent
     with frames(file, world) as trajectory:
         with pictures.drawing(f"{file}"):
-            drawn = _pictures(trajectory)
+            from tisim.plotting.look import Look
+
+            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ())))
         _print_missing(trajectory.missing)
     output_folder.claim(out_folder, drawn, overwrite)
     for name, figure in drawn.items():
         print(_save(figure, out_folder / name))
 
 
-def _pictures(trajectory: Frames) -> dict[str, Figure]:
+def _pictures(trajectory: Frames, look: Look) -> dict[str, Figure]:
     """Return the figures of a trajectory by the names of their files."""
     from tisim.plotting import loads, time_series
 
     drawn = {
-        "cloud.png": time_series.clouds(trajectory),
+        "cloud.png": time_series.clouds(trajectory, look),
         "time_series.png": time_series.quantities(trajectory),
     }
     if loads.bodies(trajectory):
@@ -217,26 +239,35 @@ def movie(
     file: File,
     to: Annotated[
         Path | None,
-        typer.Option("--to", metavar="NAME.gif", callback=nameable, help="A .gif, or an .mp4 with ffmpeg."),
+        typer.Option("--to", metavar="NAME.gif", callback=nameable, help="A .gif or .mp4 file."),
     ] = None,
     rate: Annotated[int, typer.Option(help="Frames per second.")] = 20,
     world: World = 0,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
+    colour: Colour = None,
+    view: View = "",
+    crop: Crop = "",
+    clip: Clip = None,
 ) -> None:
-    """Draw the trajectory of a run as a moving picture."""
+    """Draw the trajectory of a run as a moving picture.
+
+    An .mp4 needs ffmpeg, which the extra "movie" of tisim installs.
+    """
     from tisim.io.reader import frames
 
     file = _trajectory_file(file)
     path = to or file.with_suffix(".gif")
     with frames(file, world) as trajectory, pictures.drawing(str(path)):
+        from tisim.plotting.look import Look
         from tisim.plotting.movie import check, while_drawn
         from tisim.plotting.movie import movie as draw
 
+        look = Look.of(colour, view, crop, tuple(clip or ()))
         check(trajectory, path, rate)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with _progress("drawing") as progress:
-            draw(trajectory, path, rate, progress)
+            draw(trajectory, path, rate, progress, look)
         _print_missing(trajectory.missing)
     print(path)
 
@@ -247,21 +278,27 @@ def export(
     folder: IntoFolder = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
+    fields: Annotated[
+        str,
+        typer.Option(metavar="FIELD,...", help="Fields that are written, for vtk and xyz; all unless given."),
+    ] = "",
 ) -> None:
     """Convert the frames of a run to a format of other programs.
 
-    A trajectory is H5MD already; the format h5md makes a copy of it.
+    A trajectory is H5MD already; the format h5md makes a copy of it. For vtk the walls are written as
+    triangles.
     """
     from tisim.io.export import check, file_names
     from tisim.io.export import export as write
     from tisim.io.reader import frames, world_count
 
     file = _trajectory_file(file)
-    check(file, kind)
+    names = [name.strip() for name in fields.split(",")] if fields else []
+    check(file, kind, names)
     out_folder = folder or file.parent
     output_folder.claim(out_folder, file_names(file, kind), overwrite)
     with _progress("writing") as progress:
-        path = write(file, kind, out_folder, progress)
+        path = write(file, kind, out_folder, progress, names)
     for world in range(count := world_count(file)):
         with frames(file, world) as trajectory:
             _print_missing(

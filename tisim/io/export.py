@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from tisim.domains.domain import Domain
+from tisim.effects.walls.placement import PlacedWalls, placed_walls
+from tisim.effects.walls.walls import Walls
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, world_count
@@ -21,43 +24,53 @@ from tisim.scene.initial_state import Arrays
 FORMATS = ("vtk", "xyz", "h5md")
 _OVITO_NAMES = {"position": "pos", "velocity": "velo"}
 """OVITO's names of these quantities; the keys are their names in tisim."""
-_VERTEX = 1
-"""Number of the VTK cell type with one point."""
+_VERTEX, _TRIANGLE = 1, 5
+"""Numbers of the VTK cell types with one point and with three."""
+_UNKNOWN_SPECIES = "X"
+"""Species of particles without a material, which is not an element."""
 _VTK_TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 
 
 def export(
-    file: Path, kind: str, folder: Path, progress: Callable[[float], None] = lambda fraction: None
+    file: Path,
+    kind: str,
+    folder: Path,
+    progress: Callable[[float], None] = lambda fraction: None,
+    fields: Sequence[str] = (),
 ) -> Path:
     """Write all frames and worlds of a trajectory.h5 or result.h5; return the file to open.
 
-    kind : "vtk", a .pvd with the times and a .vtu for each frame; "xyz", one extended XYZ file; "h5md", a
-        copy of the file, after its checksums are verified. If there are several worlds, file names have the
-        index of the world.
+    kind : "vtk", a .pvd with the times, and for each frame a .vtu of the particles and one of the walls;
+        "xyz", one extended XYZ file; "h5md", a copy of the file, after its checksums are verified. If there
+        are several worlds, file names have the index of the world.
     progress : called with the finished fraction, 0..1.
+    fields : quantities that are written in addition to the position; by default all.
 
-    Raise InputError for another format, or if there is no such file.
+    Raise InputError for another format, if there is no such file, or if it has no such field.
     """
-    check(file, kind)
+    check(file, kind, fields)
     if kind == "h5md":
         return _h5md(file, folder / f"{file.stem}_copy.h5")
     count, paths = world_count(file), []
     for world in range(count):
         name = _world_name(file, world, count)
         with frames(file, world) as trajectory:
-            frames_to_write = _with_progress(trajectory, progress, world, count)
+            frames_to_write = _with_progress(trajectory, progress, world, count, fields)
             paths.append(
-                _vtk(frames_to_write, folder, name)
+                _vtk(trajectory, frames_to_write, folder, name)
                 if kind == "vtk"
                 else _xyz(trajectory, frames_to_write, folder, name)
             )
     return paths[0]
 
 
-def check(file: Path, kind: str) -> None:
-    """Raise InputError unless the file can be written in this format."""
+def check(file: Path, kind: str, fields: Sequence[str] = ()) -> None:
+    """Raise InputError unless the file can be written in this format, with these fields."""
     must(kind in FORMATS, "format", f"one of {', '.join(FORMATS)}", kind)
-    _first_frame(file)
+    known = sorted(_first_frame(file).arrays)
+    must(not fields or kind != "h5md", "fields", "chosen for vtk or xyz, as h5md is a copy", ",".join(fields))
+    for name in fields:
+        must(name in known, "fields", f"some of {', '.join(known)}", name)
 
 
 def _first_frame(file: Path) -> Frame:
@@ -77,27 +90,38 @@ def file_names(file: Path, kind: str) -> list[str]:
     for world in range(count):
         name = _world_name(file, world, count)
         with frames(file, world) as trajectory:
-            frame_names = [_frame_name(name, k) for k in range(len(trajectory))]
-        result += [f"{name}.pvd", *frame_names] if kind == "vtk" else [f"{name}.xyz"]
+            names = [_frame_name(name, k) for k in range(len(trajectory))]
+            walls = [_frame_name(f"{name}_walls", k) for k in _frames_of_walls(trajectory)]
+        result += [f"{name}.pvd", *names, *walls] if kind == "vtk" else [f"{name}.xyz"]
     return result
 
 
 def _with_progress(
-    trajectory: Frames, progress: Callable[[float], None], world: int, worlds: int
+    trajectory: Frames, progress: Callable[[float], None], world: int, worlds: int, fields: Sequence[str]
 ) -> Iterator[Frame]:
-    """Yield the frames of a world; call ``progress`` after each with the finished fraction of all worlds."""
+    """Yield the frames of a world with some fields; call ``progress`` after each with the finished fraction
+    of all worlds."""
     for k, frame in enumerate(trajectory):
-        yield frame
+        kept = {"position", *fields} if fields else frame.arrays
+        yield replace(frame, arrays={name: values for name, values in frame.arrays.items() if name in kept})
         progress((world + (k + 1) / len(trajectory)) / worlds)
 
 
-def _vtk(frames_to_write: Iterator[Frame], folder: Path, name: str) -> Path:
+def _vtk(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str) -> Path:
+    """Write a .vtu of the particles of each frame, and one of the walls, which all frames share if the walls
+    are at rest."""
+    walls = _frames_of_walls(trajectory)
     collection = ElementTree.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     datasets = ElementTree.SubElement(collection, "Collection")
     for k, frame in enumerate(frames_to_write):
         frame_file = _frame_name(name, k)
         replace_file(folder / frame_file, _vtu(frame.arrays))
-        ElementTree.SubElement(datasets, "DataSet", timestep=repr(frame.time), part="0", file=frame_file)
+        _dataset(datasets, frame.time, "0", frame_file)
+        if walls:
+            own = _frame_name(f"{name}_walls", walls[min(k, len(walls) - 1)])
+            if k < len(walls):
+                replace_file(folder / own, _vtu_of_walls(trajectory, frame))
+            _dataset(datasets, frame.time, "1", own)
     replace_file(folder / f"{name}.pvd", _xml(collection))
     return folder / f"{name}.pvd"
 
@@ -110,23 +134,80 @@ def _frame_name(name: str, k: int) -> str:
     return f"{name}_{k:05d}.vtu"
 
 
+def _dataset(collection: ElementTree.Element, time: float, part: str, file: str) -> None:
+    ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part=part, file=file)
+
+
+def _frames_of_walls(trajectory: Frames) -> list[int]:
+    """Return the frames with a file of walls: none without walls, and the first alone if they are at rest."""
+    frame = trajectory[0] if len(trajectory) else None
+    if frame is None or not any(isinstance(effect, Walls) for effect in trajectory.scene.effects):
+        return []
+    return [0] if all(one.fixed for one in _walls(trajectory, frame)) else list(range(len(trajectory)))
+
+
+def _walls(trajectory: Frames, frame: Frame) -> list[PlacedWalls]:
+    """Return the walls of a frame; planes end slightly beyond the particles and other walls."""
+    place, scene = frame.arrays["position"], trajectory.scene
+    place = place[np.isfinite(place).all(axis=1)]
+    return placed_walls(scene.effects, frame.time, place, frame.measures)
+
+
 def _vtu(arrays: Arrays) -> bytes:
     """Return one frame as an unstructured grid of vertices, with every quantity as point data."""
-    n = len(arrays["position"])
+    data = {name: values for name, values in arrays.items() if name != "position"}
+    kind = {key: name for key, name in (("Scalars", "radius"), ("Vectors", "velocity")) if name in data}
+    corners = np.arange(len(arrays["position"]))[:, None]
+    return _grid(arrays["position"], corners, _VERTEX, "PointData", data, kind)
+
+
+def _vtu_of_walls(trajectory: Frames, frame: Frame) -> bytes:
+    """Return the walls of one frame as an unstructured grid of triangles.
+
+    The cell data are ``wall``, the index of the walls among those of the scene, and ``material``, the index
+    of their material.
+    """
+    scene, bodies = trajectory.scene, _walls(trajectory, frame)
+    effects = [effect for effect in scene.effects if isinstance(effect, Walls)]
+    labels, materials = [one.label for one in effects], list(scene.materials)
+    counts = [len(one.triangles) for one in bodies]
+    which = np.repeat(np.array([labels.index(one.name) for one in bodies], np.int32), counts)
+    material_of = np.array(
+        [materials.index(one.material) if one.material in materials else 0 for one in effects], np.int32
+    )
+    points = np.concatenate([np.empty((0, 3)), *(one.triangles.reshape(-1, 3) for one in bodies)])
+    corners = np.arange(len(points)).reshape(-1, 3)
+    data = {"wall": which, "material": material_of[which]}
+    return _grid(points, corners, _TRIANGLE, "CellData", data, {"Scalars": "wall"})
+
+
+def _grid(
+    points: np.ndarray,
+    corners: np.ndarray,
+    cell: int,
+    kind: str,
+    data: Mapping[str, np.ndarray],
+    chosen: Mapping[str, str],
+) -> bytes:
+    """Return an unstructured grid.
+
+    corners : indices of the points of each cell, shape (cells, points of a cell). cell : VTK cell type.
+    kind : of the data, "PointData" or "CellData". chosen : names of the data that are shown first.
+    """
     root = ElementTree.Element(
         "VTKFile", type="UnstructuredGrid", version="1.0", byte_order="LittleEndian", header_type="UInt64"
     )
     grid = ElementTree.SubElement(root, "UnstructuredGrid")
-    piece = ElementTree.SubElement(grid, "Piece", NumberOfPoints=str(n), NumberOfCells=str(n))
-    data = ElementTree.SubElement(piece, "PointData", Scalars="radius", Vectors="velocity")
-    for name, values in arrays.items():
-        if name != "position":
-            _data_array(data, name, values)
-    _data_array(ElementTree.SubElement(piece, "Points"), "position", arrays["position"])
+    counts = {"NumberOfPoints": str(len(points)), "NumberOfCells": str(len(corners))}
+    piece = ElementTree.SubElement(grid, "Piece", counts)
+    element = ElementTree.SubElement(piece, kind, dict(chosen))
+    for name, values in data.items():
+        _data_array(element, name, values)
+    _data_array(ElementTree.SubElement(piece, "Points"), "position", points)
     cells = ElementTree.SubElement(piece, "Cells")
-    _data_array(cells, "connectivity", np.arange(n))
-    _data_array(cells, "offsets", np.arange(1, n + 1))
-    _data_array(cells, "types", np.full(n, _VERTEX, np.uint8))
+    _data_array(cells, "connectivity", corners.ravel())
+    _data_array(cells, "offsets", corners.shape[1] * np.arange(1, len(corners) + 1))
+    _data_array(cells, "types", np.full(len(corners), cell, np.uint8))
     return _xml(root)
 
 
@@ -150,9 +231,9 @@ def _xml(root: ElementTree.Element) -> bytes:
 def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str) -> Path:
     """Write extended XYZ: for each frame the number of particles, a line of keys, and one line per particle.
 
-    All particles have the species X, which is not an element. Positions are in m, and not in Angstrom as is
-    common in chemistry. The key Units has the unit of each column, "pos:m velo:m/s mass:kg", with dots inside
-    compound units, and "1" for pure numbers.
+    The species of a particle is its material if the scene has several, and otherwise X, which is not an
+    element. Positions are in m, and not in Angstrom as is common in chemistry. The key Units has the unit of
+    each column, "pos:m velo:m/s mass:kg", with dots inside compound units, and "1" for pure numbers.
     """
     path = folder / f"{name}.xyz"
     temporary = path.with_name(temporary_name(path.name))
@@ -163,8 +244,18 @@ def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
             keys = f'Properties={properties} Units="{_units(trajectory, frame.arrays)}" '
             keys += f"Time={frame.time!r} Step={frame.step}"
             file.write(f"{len(columns[0])}\n{box}{keys}\n")
-            file.writelines("X " + " ".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
+            species = _species(trajectory, frame.arrays)
+            rows = zip(species, zip(*columns, strict=True), strict=True)
+            file.writelines(f"{name} {' '.join(map(repr, row))}\n" for name, row in rows)
     return path
+
+
+def _species(trajectory: Frames, arrays: Arrays) -> list[str]:
+    """Return the species of each particle."""
+    names = list(trajectory.scene.materials)
+    if len(names) < 2 or "material" not in arrays:
+        return [_UNKNOWN_SPECIES] * len(arrays["position"])
+    return [names[k] for k in arrays["material"].tolist()]
 
 
 def _lattice(domain: Domain, time: float) -> str:

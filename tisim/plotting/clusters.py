@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from tisim.analysis.bounding_ellipsoid import Ellipsoid
-from tisim.plotting.cloud import corners, directions, panel, project, view
-from tisim.plotting.facets import PROJECTION
+from tisim.plotting.cloud import directions, panel
+from tisim.plotting.scenery import box_scenery, window
 from tisim.plotting.style import empty, legend_above
-from tisim.plotting.walls import AROUND
+from tisim.rendering.camera import USUAL_CAMERA
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 
@@ -19,6 +21,8 @@ CLUSTER_COLOURS = colormaps["tab20"](np.arange(20))[:, :3]
 """Colours of clusters, such that clusters adjacent in size have different colours."""
 SINGLE = (0.88, 0.88, 0.88)
 """Grey of particles without bonds."""
+AROUND = np.linspace(0, 2 * np.pi, 73)
+"""Angles of the points of a circle, rad."""
 
 
 def clusters(
@@ -35,17 +39,18 @@ def clusters(
     axis = figure.subplots()
     colours = cluster_colours(cluster)
     lines = [] if ellipsoid is None else [_silhouette(ellipsoid)]
-    box = corners(*scene.domain.bounds())
-    around = np.vstack([box, *(np.column_stack([line, 0 * line[:, 0]]) for line in lines)])
-    square = view(state, around)
-    panel(axis, state, square, box, colours)
+    box = box_scenery(*scene.domain.bounds())
+    # Points in space with the same projection as the outline of the ellipsoid.
+    ends = [line @ USUAL_CAMERA.axes[:, :2].T for line in lines]
+    part = window([state], [replace(box, points=np.vstack([box.points, *ends]))])
+    panel(axis, state, part, box, colours)
     for line in lines:
         axis.plot(*line.T, color="0.2", lw=1.2, zorder=3, label="bounding ellipsoid")
     if hull:
         axis.plot(*_outline(state).T, color="0.2", lw=1.2, ls="--", zorder=3, label="convex hull")
     if lines or hull:
         legend_above(axis)
-    directions(axis, square, np.zeros(3))
+    directions(axis, part, np.zeros(3))
     size = np.bincount(cluster)
     several = int((size > 1).sum())
     bound = int(size[size > 1].sum())
@@ -66,16 +71,16 @@ def cluster_colours(cluster: np.ndarray) -> np.ndarray:
 def _silhouette(ellipsoid: Ellipsoid) -> np.ndarray:
     """Return the projected outline of an ellipsoid, m, shape (n, 2): the image of a circle under the square
     root of M M^T, with M of the projected semi-axes."""
-    seen = PROJECTION[:, :2].T @ (ellipsoid.axes.T * ellipsoid.semi_axes)
+    seen = USUAL_CAMERA.axes[:, :2].T @ (ellipsoid.axes.T * ellipsoid.semi_axes)
     squares, axes = np.linalg.eigh(seen @ seen.T)
     circle = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
-    return project(ellipsoid.centre[None])[:, :2] + circle * np.sqrt(squares) @ axes.T
+    return USUAL_CAMERA.project(ellipsoid.centre)[:2] + circle * np.sqrt(squares) @ axes.T
 
 
 def _outline(state: Arrays) -> np.ndarray:
     """Return the projected outline of the convex hull of spheres, m, shape (n, 2)."""
     circle = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
-    rims = project(state["position"])[:, None, :2] + state["radius"][:, None, None] * circle
+    rims = USUAL_CAMERA.project(state["position"])[:, None, :2] + state["radius"][:, None, None] * circle
     points = rims.reshape(-1, 2)
     ring = ConvexHull(points).vertices
     return points[np.append(ring, ring[0])]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import importlib.util
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from subprocess import CalledProcessError
 
+import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,45 +18,59 @@ from tisim.errors import InputError, RunError, Words, must
 from tisim.files.atomic import replacing
 from tisim.io.reader import Frames
 from tisim.plotting import cloud
-from tisim.plotting.facets import PROJECTION, shapes_of
+from tisim.plotting.bodies import shapes_of
+from tisim.plotting.colours import Colouring, chosen, sample, scaled, values_of
+from tisim.plotting.look import USUAL, Look
+from tisim.plotting.scenery import finite_grains, remaining, scenery, window
+from tisim.rendering.camera import Window
 from tisim.scene.initial_state import Arrays
 
 SIDE = 5.0
 """Side of the picture, inches."""
-DPI = 110
-"""Pixels per inch."""
+LEGEND = 1.3
+"""Width of the legend, inches."""
+DPI = 120
+"""Pixels per inch. The picture has even numbers of pixels, which H.264 demands."""
+FFMPEG = "imageio_ffmpeg"
+"""Module that carries ffmpeg, for machines without it."""
 
 
 def movie(
-    frames: Frames, path: Path, rate: int = 20, progress: Callable[[float], None] = lambda fraction: None
+    frames: Frames,
+    path: Path,
+    rate: int = 20,
+    progress: Callable[[float], None] = lambda fraction: None,
+    look: Look = USUAL,
 ) -> None:
     """Write a movie of all frames, ``rate`` of them per second, replacing an earlier one.
 
-    path : ends in .gif, or in .mp4 if ffmpeg is installed; raise InputError otherwise.
-    progress : called with the finished fraction, 0..1.
+    path : ends in .gif, or in .mp4 if ffmpeg or imageio-ffmpeg is installed; raise InputError otherwise.
+    progress : called with the finished fraction, 0..1. look : view, crop, cuts and colours.
     """
-    writer = check(frames, path, rate)
-    coloured, ranges = _scales(frames)
-    figure = Figure(figsize=(SIDE + 0.9 * (coloured is not None), SIDE), facecolor="white")
+    check(frames, path, rate)
+    coloured, outermost, part = _scales(frames, look)
+    figure = Figure(figsize=(SIDE + LEGEND * (coloured is not None), SIDE), facecolor="white")
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.0, 0.0, SIDE / figure.get_figwidth(), 0.93))
     shapes = shapes_of(frames.scene)
-    box = cloud.corners(*frames.scene.domain.bounds())
-    square = cloud.view(ranges, np.vstack([box, *walls_of_all(frames, ranges)]))
     if coloured is not None:
-        side = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
-        cloud.scale(figure, None, coloured, side)
-    # The text is between the caption and the drawing, and covers neither grains nor the colour scale.
+        beside = figure.add_axes(((SIDE + 0.05) / figure.get_figwidth(), 0.2, 0.025, 0.55))
+        coloured.legend(figure, None, beside)
+    # The text is between the caption and the drawing, and covers neither grains nor the legend.
     figure.text(0.5, 0.935, frames.missing, ha="center", fontsize=7)
     unfinished = path.with_name(while_drawn(path))
     try:
-        with replacing(path, unfinished), writer.saving(figure, str(unfinished), DPI):
+        with (
+            _writer(path, rate) as writer,
+            replacing(path, unfinished),
+            writer.saving(figure, str(unfinished), DPI),
+        ):
             for k, frame in enumerate(frames):
                 axis.clear()
-                walls = cloud.walls_at(frames.scene, [ranges], frame.time)
-                colours = cloud.heat_colours(frame.arrays, coloured)
-                cloud.panel(axis, frame.arrays, square, box, colours, walls, shapes)
-                cloud.directions(axis, square, cloud.gravity(frames.scene))
+                around = scenery(frames.scene, [outermost], frame.time, frame.measures)
+                colours = None if coloured is None else coloured.of(frame.arrays)
+                cloud.panel(axis, frame.arrays, part, around, colours, shapes, look, int(SIDE * DPI))
+                cloud.directions(axis, part, cloud.gravity(frames.scene), camera=look.camera)
                 figure.suptitle(cloud.caption(frame.arrays, frame.time, frames.scene), fontsize=10, y=0.985)
                 writer.grab_frame()
                 progress((k + 1) / len(frames))
@@ -66,37 +83,69 @@ def while_drawn(path: Path) -> str:
     return f"{path.stem}.new{path.suffix}"
 
 
-def check(frames: Frames, path: Path, rate: int) -> AbstractMovieWriter:
-    """Return the writer for such a file; raise InputError if there are not enough frames, or no writer is
-    available."""
+def check(frames: Frames, path: Path, rate: int) -> None:
+    """Raise InputError if there are not enough frames, or if there is no writer for such a file."""
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
     must(len(frames) > 1, "file", "one with 2 frames or more", Words(f"{len(frames)} frames"))
+    must(path.suffix in (".gif", ".mp4"), "movie", "a .gif or .mp4 file", path.name)
     if path.suffix == ".mp4":
-        if not FFMpegWriter.isAvailable():
-            raise InputError(f"movie must be a .gif if ffmpeg is not installed; received {path.name!r}")
-        return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
-    must(path.suffix == ".gif", "movie", "a .gif or .mp4 file", path.name)
-    return PillowWriter(fps=rate)
+        with _ffmpeg():
+            if not FFMpegWriter.isAvailable():
+                advice = 'python -m pip install "tisim[movie]"'
+                rule = f"a .gif, as there is no ffmpeg ({advice} installs one)"
+                raise InputError(f"movie must be {rule}; received {path.name!r}")
 
 
-def walls_of_all(frames: Frames, ranges: Arrays) -> list[np.ndarray]:
-    """Return the projected outlines of walls at the times of all frames, m, because moving walls may extend
-    farther between the first and the last frame."""
-    return [line for t in frames.times for line in cloud.walls_at(frames.scene, [ranges], float(t))]
+@contextmanager
+def _writer(path: Path, rate: int) -> Iterator[AbstractMovieWriter]:
+    """Yield the writer for a file."""
+    if path.suffix == ".gif":
+        yield PillowWriter(fps=rate)
+    else:
+        with _ffmpeg():
+            yield FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p", "-crf", "20"])
 
 
-def _scales(frames: Frames) -> tuple[cloud.Normalize | None, Arrays]:
-    """Return the temperature scale and the extent of the cloud over all frames."""
-    position, radius, heat = [], [], []
+@contextmanager
+def _ffmpeg() -> Iterator[None]:
+    """Use the ffmpeg of this machine, or else of imageio-ffmpeg if that is installed."""
+    if FFMpegWriter.isAvailable() or importlib.util.find_spec(FFMPEG) is None:
+        yield
+        return
+    import imageio_ffmpeg
+
+    with matplotlib.rc_context({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}):
+        yield
+
+
+def _scales(frames: Frames, look: Look) -> tuple[Colouring | None, Arrays, Window]:
+    """Return the colours, the outermost grains of all frames, and the window."""
+    outermost: list[Arrays] = []
+    values: list[np.ndarray] = []
+    name: str | None = None
     for frame in frames:
-        arrays = frame.arrays
-        if not len(arrays["radius"]):
-            continue
-        for extreme in (np.argmin, np.argmax):
-            for k in {int(i) for i in extreme(arrays["position"] @ PROJECTION, axis=0)}:
-                position.append(arrays["position"][k])
-                radius.append(arrays["radius"].max())
-        if "temperature" in arrays:
-            heat.append({name: arrays[name] for name in ("temperature", "radius")})
-    norm = cloud.temperatures(heat)
-    return norm, {"position": np.array(position).reshape(-1, 3), "radius": np.array(radius)}
+        grains = frame.arrays
+        if not values and len(grains["radius"]):
+            name = chosen(frames.scene, [grains], look.colour)
+        if name is not None:
+            values.append(sample(values_of(grains, name)))
+        outermost.append(_outermost(grains, look, whole=not outermost))
+    together = {key: np.concatenate([one[key] for one in outermost]) for key in ("position", "radius")}
+    surroundings = []
+    for k, time in enumerate(frames.times):
+        # Moving walls may extend farther between the first and the last frame.
+        known = {key: float(series[k]) for key, series in frames.measures.items()}
+        surroundings.append(scenery(frames.scene, [together], float(time), known))
+    part = window(outermost, surroundings, look)
+    return None if name is None else scaled(frames.scene, name, values), together, part
+
+
+def _outermost(grains: Arrays, look: Look, whole: bool) -> Arrays:
+    """Return the grains with the largest and least coordinates in the projection, of all or of those that
+    have not left the others."""
+    place, radius = finite_grains(grains)
+    seen = look.camera.project(place)
+    kept = np.arange(len(place)) if whole else np.flatnonzero(remaining(seen, radius))
+    if len(kept):
+        kept = kept[np.unique([pick(seen[kept], axis=0) for pick in (np.argmin, np.argmax)])]
+    return {"position": place[kept], "radius": np.full(len(kept), radius.max(initial=0.0))}

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from tisim.errors import Words, must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import start_and_end
+from tisim.plotting.look import USUAL, Look
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity, scale_of
 
 
@@ -56,12 +57,16 @@ def _mean(values: np.ndarray, mass: np.ndarray) -> np.ndarray:
     return np.average(values, axis=0, weights=mass) if len(mass) else np.full(3, np.nan)
 
 
-def clouds(frames: Frames) -> Figure:
-    """Draw the first and the last frame side by side. Raise InputError if there are no frames."""
+def clouds(frames: Frames, look: Look = USUAL) -> Figure:
+    """Draw the first and the last frame side by side. Raise InputError if there are no frames.
+
+    look : view, crop, cuts and colours.
+    """
     must(len(frames) > 0, "file", "one with a frame", Words("one with none yet"))
     first, last = frames[0], frames[-1]
     states, times = (first.arrays, last.arrays), (first.time, last.time)
-    return start_and_end(states, times, frames.scene, "last frame" if frames.missing else "end")
+    heading = "last frame" if frames.missing else "end"
+    return start_and_end(states, times, frames.scene, heading, look, (first.measures, last.measures))
 
 
 def mark_missing(figure: Figure, frames: Frames) -> Figure:

@@ -8,7 +8,7 @@ from tisim.cases.blast.figures import SEQUENCE_FRAMES, BlastHistory, beside, pic
 from tisim.cases.blast.rest_figure import W_TAU, growth, rest_figure, rest_table, rested
 from tisim.cases.blast.scene import scene
 from tisim.io.reader import frames
-from tisim.plotting.facets import PROJECTION
+from tisim.rendering.camera import USUAL_CAMERA
 
 
 @pytest.mark.slow
@@ -24,7 +24,7 @@ def test_pictures_of_a_run(tmp_path):
         last = trajectory[-1]
     assert len(figures["sequence.png"].axes) == SEQUENCE_FRAMES
     arrows = figures["velocities.png"].axes[-1].collections[0]
-    np.testing.assert_array_equal(arrows.U, (last.arrays["velocity"] @ PROJECTION)[:, 0])
+    np.testing.assert_array_equal(arrows.U, USUAL_CAMERA.project(last.arrays["velocity"])[:, 0])
     left, right, *_ = figures["envelope.png"].axes
     np.testing.assert_array_equal(left.lines[0].get_ydata(), history.axes[:, 0])
     assert history.axes[-1, 0] > 1.1 * history.axes[0, 0]

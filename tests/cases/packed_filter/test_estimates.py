@@ -5,11 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from tisim import Box
 from tisim.analysis import Mean
-from tisim.cases.packed_filter import figures, pictures, problem
+from tisim.cases.packed_filter import figures, problem
 from tisim.cases.packed_filter.lone_fibre import SIZE_CLASSES, LoneFibre
 from tisim.cases.packed_filter.matrix import Matrix
 from tisim.cases.packed_filter.measures import captured_fraction, missing, penetration, released_fraction
@@ -103,12 +102,6 @@ def test_designs_have_enough_fibres_and_one_grid():
     assert first.matrix.side >= 2 * (first.matrix.length + first.matrix.diameter)
     faster = problem.designed({**high, "speed": 1e-3}, 0, **problem.SEARCHED["small"])
     assert faster.duration == pytest.approx(second.duration * problem.SPEED / 1e-3)
-
-
-def test_quaternions_turn_z_to_directions(rng):
-    axes = np.concatenate([rng.normal(size=(20, 3)), np.eye(3), -np.eye(3)])
-    turned = Rotation.from_quat(pictures.turns_to(axes), scalar_first=True).apply([0.0, 0.0, 1.0])
-    np.testing.assert_allclose(turned, axes / np.linalg.norm(axes, axis=1)[:, None], atol=1e-12)
 
 
 def test_figure_of_estimates_and_its_table():

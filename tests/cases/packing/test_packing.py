@@ -1,6 +1,5 @@
 """The case packing: its scenes, its table, its pictures."""
 
-import numpy as np
 import pytest
 
 from tisim import Recording, run
@@ -9,9 +8,7 @@ from tisim.cases.packing.measures import measured
 from tisim.cases.packing.scene import mixed, of_shape, rod
 from tisim.io import run_folder
 from tisim.io.reader import frames
-from tisim.plotting.facets import facets
 from tisim.plotting.time_series import clouds
-from tisim.shapes import EllipsoidShape, SuperquadricShape
 
 
 def test_sizes_of_a_mixture():
@@ -45,28 +42,9 @@ def test_the_pictures_of_a_run(tmp_path):
             figure = pictures(trajectory)["packing.png"]
             start, _end = clouds(trajectory).axes
     left, right = figure.axes
-    assert left.collections
+    assert left.images[0].get_array()[..., 3].max() == 1
     assert sum(bar.get_height() for bar in right.patches) == 40
     assert right.get_title(loc="left") == f"(b) packing fraction {measured(result).fraction:.3f}"
-    (drawn,) = start.collections
-    assert len(drawn.get_paths()) > 40 * 20
-    assert not start.images
+    (drawn,) = start.images
+    assert 0.1 < drawn.get_array()[..., 3].mean() < 0.9
     assert start.get_title(loc="left").startswith("(a) start, t = 0 s: 40 bodies, mean bounding radius 1 m")
-
-
-@pytest.mark.parametrize(
-    "shape",
-    [
-        rod(3.0),
-        EllipsoidShape(semi_axes=(0.5, 0.7, 1.0)),
-        SuperquadricShape(semi_axes=(0.5, 0.7, 1.0), exponents=(4.0, 3.0, 5.0)),
-    ],
-)
-def test_facets_are_a_closed_surface_inside_the_shape(shape):
-    quads, outward = facets(shape)
-    assert shape.contains(quads * (1 - 1e-9)).all()
-    # The flux of r/3 through the surface is the volume.
-    across = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]) / 2
-    volume = np.abs(np.einsum("fk,fk->f", quads.mean(axis=1), across)).sum() / 3
-    assert 0.8 * shape.volume() < volume < shape.volume()
-    np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1)

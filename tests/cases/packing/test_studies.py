@@ -207,7 +207,7 @@ def test_pictures_of_packings():
     ]
     figure = in_cylinders(made[:1])
     assert "D_{cyl}" in figure.axes[0].get_title()
-    assert figure.axes[0].collections
+    assert figure.axes[0].images
     assert "9°" in in_wedges(made[1:]).axes[0].get_title()
     density = wedge_directions(made[1:]).axes[0].collections[0].get_array()
     # Most rods lie along the bottom or the slope, within the first two bins of the azimuth.
