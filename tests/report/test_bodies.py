@@ -14,6 +14,7 @@ from tisim.effects import (
     Translation,
     Walls,
 )
+from tisim.effects.walls.placement import placed
 from tisim.geometry import (
     BoxSurface,
     ConicalSurface,
@@ -23,8 +24,7 @@ from tisim.geometry import (
     SphericalSurface,
     TriangulatedSurface,
 )
-from tisim.plotting.walls import placed
-from tisim.report.bodies import bodies, mesh
+from tisim.report.bodies import bodies
 
 SQUARE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
@@ -45,21 +45,24 @@ def area(drawn):
 
 
 @pytest.mark.parametrize(
-    ("shape", "expected", "lines"),
+    ("walls", "expected", "lines"),
     [
-        (Disc(radius=0.5), np.pi * 0.25, 64),
-        (CylindricalSurface(end=(0, 0.0, 2.0), radius=0.5), 2 * np.pi, 128),
-        (CylindricalSurface(end=(0, 0.0, 2.0), radius=0.5, closed=True), 2.5 * np.pi, 256),
-        (ConicalSurface(end=(0, 0, 0.4), start_radius=0.0, end_radius=0.3), np.pi * 0.3 * 0.5, 64),
-        (SphericalSurface(radius=0.5), np.pi, 0),
-        (BoxSurface(high=(1, 2, 3)), 22.0, 12),
-        (TriangulatedSurface(vertices=SQUARE, faces=((0, 1, 2), (0, 2, 3))), 1.0, 4),
+        ({"discs": [Disc(radius=0.5)]}, np.pi * 0.25, 96),
+        ({"cylinders": [CylindricalSurface(end=(0, 0.0, 2.0), radius=0.5)]}, 2 * np.pi, 192),
+        ({"cylinders": [CylindricalSurface(end=(0, 0.0, 2.0), radius=0.5, closed=True)]}, 2.5 * np.pi, 192),
+        (
+            {"cones": [ConicalSurface(end=(0, 0, 0.4), start_radius=0.0, end_radius=0.3)]},
+            np.pi * 0.3 * 0.5, 96,
+        ),
+        ({"spheres": [SphericalSurface(radius=0.5)]}, np.pi, 0),
+        ({"boxes": [BoxSurface(high=(1, 2, 3))]}, 22.0, 12),
+        ({"surface": TriangulatedSurface(vertices=SQUARE, faces=((0, 1, 2), (0, 2, 3)))}, 1.0, 4),
     ],
 )  # fmt: skip
-def test_areas_and_rims(shape, expected, lines):
-    drawn = mesh(shape)
-    assert area(drawn) == pytest.approx(expected, rel=6e-3)
-    assert len(drawn.lines) == lines
+def test_areas_and_rims(walls, expected, lines):
+    (body,) = bodies(walled(**walls), np.zeros(1), {}, LOW, HIGH)
+    assert area(body.mesh) == pytest.approx(expected, rel=6e-3)
+    assert len(body.mesh.lines) == lines
 
 
 def test_planes_end_at_each_other():

@@ -25,6 +25,7 @@ from tisim.errors import Words, must
 from tisim.io.h5md import ABSENT
 from tisim.io.reader import Frame
 from tisim.io.run_folder import units
+from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.columns import WHOLE_TYPES, Column, Scale, column, rounded, uniform_scale, whole_numbers
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -35,10 +36,7 @@ SMALL_PERCENTILE = 5.0
 """Percentile of the radii that counts as small."""
 EXACT_VALUES = 4_000_000
 """Up to this number of values, quantities that change are rounded to 16 bits, otherwise to 8."""
-WIDE_RANGE = 30.0
-"""A positive quantity has a logarithmic scale if its largest value exceeds its least by this factor, and its
-median is in the lowest tenth of the range."""
-USUAL = (0.5, 99.5)
+COLOURED_PERCENTILES = (0.5, 99.5)
 """Percentiles between which values are coloured at first, if the range is more than twice as wide."""
 FROM_ZERO = 0.05
 """A linear scale of colours begins at 0 if its lower end would be below this part of the upper end."""
@@ -334,7 +332,7 @@ def _shown(found: _Range) -> tuple[float, float]:
     """Return the range of the colours at first."""
     if not found.sample:
         return 0.0, 1.0
-    usual = np.percentile(np.concatenate(found.sample), USUAL)
+    usual = np.percentile(np.concatenate(found.sample), COLOURED_PERCENTILES)
     outliers = found.high - found.low > 2 * (usual[1] - usual[0]) > 0
     low, high = (
         (float(usual[0]), float(usual[1])) if outliers and not found.whole else (found.low, found.high)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import colormaps
 
-from tisim.plotting import facets
+from tisim.plotting.bodies import shapes_of
 from tisim.plotting.cloud import gravity
 from tisim.report import bodies
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence
@@ -56,7 +56,7 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         "box": box, "low": low.tolist(), "high": high.tolist(),
         "focus": {"low": focus[0].tolist(), "high": focus[1].tolist()},
         "bodies": [body.facts() for body in walls], "magnets": [magnet.facts() for magnet in magnets],
-        "shapes": [_shape(shape) for shape in facets.shapes_of(scene)], "gravity": gravity(scene).tolist(),
+        "shapes": [_shape(shape) for shape in shapes_of(scene)], "gravity": gravity(scene).tolist(),
         "medianRadius": _median_radius(sequence),
     }  # fmt: skip
 
