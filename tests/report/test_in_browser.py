@@ -365,3 +365,15 @@ def test_contacts_are_those_of_the_file(opened, tmp_path, touching):
         assert {tuple(sorted(row[:2])) for row in rows} == set(pairs)
         for a, b, depth in rows:
             assert depth == pytest.approx(pairs[min(a, b), max(a, b)], abs=0.5001 * largest / 255)
+
+
+def test_runs_that_begin_or_stay_empty_are_shown(record, opened, tmp_path):
+    none = {"id": np.empty(0, int), "position": np.empty((0, 3))}
+    some = {"id": [0, 1], "position": [[0.0, 0.0, 0.0], [0.004, 0.0, 0.0]]}
+    for name, given, last in (("begins", [none, some], 2), ("stays", [none, none], 0)):
+        html = run_report(record(scene(2), given, f"{name}.h5"), tmp_path / f"{name}.html")
+        with opened(html) as page:
+            page.evaluate("report.player.go(1)")
+            assert page.text_content("[aria-live]").endswith(f", {last} particles")
+            bodies = page.evaluate(READ_PICKED)["counts"].keys() - {"0"}
+            assert len(bodies) == last

@@ -1,8 +1,13 @@
 """The report on a run: its tables, its size, and the command that writes it."""
 
+import fnmatch
 import html
+import importlib
+import inspect
 import json
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +17,14 @@ from tests.report.conftest import scene
 from tisim import InputError, Material
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
+from tisim.cli.inspect import report
 from tisim.effects import Granular, Gravity, Walls
 from tisim.geometry import Plane
 from tisim.io.reader import frames
 from tisim.plotting import style
 from tisim.report import run_report as write
-from tisim.report.run_report import ReportOptions, read_checks
+from tisim.report.page import SCRIPTS
+from tisim.report.run_report import SIZE_LIMIT, ReportOptions, read_checks
 
 
 def facts_of(path):
@@ -45,9 +52,34 @@ def test_frames_are_left_out_to_keep_the_limit(record, rng, tmp_path):
     assert (indices[0], indices[-1]) == (0, 59)
     stride = indices[1]
     assert indices == sorted({*range(0, 60, stride), 59})
-    notice = f"it has every {stride}th frame and the last: {len(indices)} of 60."
+    notice = f"it has one frame in {stride} and the last: {len(indices)} of 60."
     assert notice in text
     assert len(data["series"]["times"]) == 60, "the curves use all"
+
+
+def test_a_large_page_keeps_the_limit_too(record, rng, tmp_path, monkeypatch):
+    """The space for everything beside the frames is found out, not assumed."""
+    module = importlib.import_module("tisim.report.run_report")
+    monkeypatch.setattr(module, "RESERVED_BYTES", 0.0)
+    path = record(scene(2000), noise(rng, 2000, 60))
+    written = write(path, tmp_path / "r.html", options=ReportOptions(limit=0.6))
+    assert 0.4e6 < written.stat().st_size <= 0.6e6
+    with pytest.raises(InputError, match=r"limit must be large enough for the scene, .*; received 0\.6 MB"):
+        write(path, tmp_path / "s.html", options=ReportOptions(limit=0.6, pictures={"one": bytes(500_000)}))
+    assert not (tmp_path / "s.html").exists()
+
+
+def test_the_command_has_the_same_default():
+    assert inspect.signature(report).parameters["limit"].default == SIZE_LIMIT
+
+
+def test_the_wheel_carries_the_static_files():
+    root = Path(__file__).parents[2]
+    patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]
+    names = [path.name for path in (root / "tisim/report/static").iterdir()]
+    assert set(names) == {*SCRIPTS, "page.css", "page.html"}
+    for name in names:
+        assert any(fnmatch.fnmatch(f"static/{name}", one) for one in patterns["tisim.report"]), name
 
 
 def test_particles_are_left_out_if_two_frames_are_too_many(record, rng, tmp_path):

@@ -207,8 +207,8 @@ def _survey(frames: FrameSequence, chosen: Sequence[int], part: int) -> _Survey:
                 np.minimum(corners[0], position.min(axis=0)),
                 np.maximum(corners[1], position.max(axis=0)),
             )
-            for name, values in here.items():
-                _extend(ranges, name, values, max(1, len(values) * len(chosen) // SAMPLED_VALUES))
+        for name, values in here.items():
+            _extend(ranges, name, values, max(1, len(values) * len(chosen) // SAMPLED_VALUES))
     if not radii:
         low, high, corners = np.zeros(3), np.ones(3), (np.zeros(3), np.ones(3))
     small = float(np.percentile(np.concatenate(radii), SMALL_PERCENTILE)) if radii else 1.0

@@ -34,8 +34,9 @@ from tisim.version import __version__
 
 SIZE_LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
-RESERVED_BYTES = 0.25e6
-"""Bytes that are reserved for everything but the recording and pictures, in characters of the page."""
+RESERVED_BYTES, LEAST_ROOM, ATTEMPTS = 0.25e6, 0.1e6, 4
+"""Bytes that are reserved at first for everything but the recording and the pictures, and the least for the
+recording; the number of attempts to keep the limit with more reserved."""
 LONGEST_VALUE = 160
 """Number of characters of a setting that are shown in the table."""
 LONGEST_TOML = 200_000
@@ -86,26 +87,39 @@ def run_report(
     file : trajectory.h5 or result.h5 of the run. to : file to write, replaced if it exists.
     world : index in a batch. options : the default is ``ReportOptions()``.
 
-    Raise InputError if there are no frames, or if an option does not fit; RunError if the disk is full.
+    Raise InputError if there are no frames, if an option does not fit, or if the page exceeds the limit
+    without any frames; RunError if the disk is full.
     """
-    chosen, path = options or ReportOptions(), Path(to)
+    chosen, path, reserved = options or ReportOptions(), Path(to), RESERVED_BYTES
     with frames(file, world) as sequence:
-        page = run_page(KeptFrames(sequence), chosen, _result(Path(file), sequence.scene))
-    replace_file(path, page.html().encode())
-    return path
+        kept, result = KeptFrames(sequence), _result(Path(file), sequence.scene)
+        for _ in range(ATTEMPTS):
+            page = run_page(kept, chosen, result, reserved)
+            content = page.html().encode()
+            if len(content) <= 1e6 * chosen.limit:
+                replace_file(path, content)
+                return path
+            # Everything but the recording and the pictures, which are in base64.
+            encoded = len(page.recording) + sum(map(len, chosen.pictures.values()))
+            reserved = 1.01 * (len(content) - 4 / 3 * encoded)
+    rule = f"large enough for the scene, its walls and its pictures, such as {2e-6 * len(content):.3g} MB"
+    raise InputError(f"limit must be {rule}; received {chosen.limit:g} MB")
 
 
-def run_page(sequence: KeptFrames, options: ReportOptions, result: Result | None) -> Page:
+def run_page(
+    sequence: KeptFrames, options: ReportOptions, result: Result | None, reserved: float = RESERVED_BYTES
+) -> Page:
     """Return the page of a run.
 
-    result : of the same run; None if it has not ended.
+    result : of the same run; None if it has not ended. reserved : bytes of everything but the recording and
+    the pictures.
     """
     must(len(sequence) > 0, "file", "one with a frame", Words("one with none yet"))
     scene, count = sequence.scene, len(sequence)
     # The function asks for a scene, times and frames alone.
     series = time_series.history(cast(Frames, sequence))
     times, panels = tables.time_series(series, scene, sequence.measures)
-    trajectory, network, notices = _recording(sequence, options)
+    trajectory, network, notices = _recording(sequence, options, reserved)
     state, verdict, sentences = _status(sequence, result)
     first, last = sequence[0].arrays, sequence[-1].arrays
     lengths = [len(one.data) for one in trajectory.columns]
@@ -161,13 +175,13 @@ def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list
 
 
 def _recording(
-    sequence: FrameSequence, options: ReportOptions
+    sequence: FrameSequence, options: ReportOptions, reserved: float
 ) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
     """Return the frames that the limit allows, with their contacts, and sentences about those left out."""
-    room = options.limit * 1e6 - RESERVED_BYTES - sum(4 / 3 * len(png) for png in options.pictures.values())
-    room = 0.75 * max(room, 0.1e6)
+    room = options.limit * 1e6 - reserved - sum(4 / 3 * len(png) for png in options.pictures.values())
+    room = 0.75 * max(room, LEAST_ROOM)
     count, particles = len(sequence), max(len(sequence[k].arrays["id"]) for k in (0, -1))
-    # A particle takes at least a byte in a frame; frames that cannot fit are not read.
+    # A particle usually takes a byte or more in a frame; frames that would hardly fit are not read.
     stride, part = max(1, int(count * particles // room)), 1
     while True:
         chosen = sorted({*range(0, count, stride), count - 1})
@@ -182,7 +196,7 @@ def _recording(
     notices = []
     if len(chosen) < count:
         notices.append(
-            f"To keep this file below {options.limit:g} MB, it has every {stride}th frame and the last: "
+            f"To keep this file below {options.limit:g} MB, it has one frame in {stride} and the last: "
             f"{len(chosen)} of {count}. The curves below use all frames."
         )
     if part > 1:
