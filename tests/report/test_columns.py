@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -11,6 +11,7 @@ from tisim.report.columns import WHOLE_TYPES, Scale, column, rounded, uniform_sc
 SHAPES = st.tuples(st.integers(1, 6), st.integers(0, 7), st.integers(1, 4))
 
 
+@settings(max_examples=100, derandomize=True, database=None, deadline=None)
 @given(data=st.data(), bits=st.sampled_from(list(WHOLE_TYPES)), shape=SHAPES)
 def test_whole_numbers_are_read_back_exactly(data, bits, shape):
     whole = data.draw(arrays.arrays(WHOLE_TYPES[bits], shape))

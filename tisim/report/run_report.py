@@ -34,7 +34,7 @@ from tisim.version import __version__
 
 SIZE_LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
-RESERVED_BYTES, LEAST_ROOM, ATTEMPTS = 0.25e6, 0.1e6, 4
+RESERVED_BYTES, LEAST_ROOM, SIZE_ATTEMPTS = 0.25e6, 0.1e6, 4
 """Bytes that are reserved at first for everything but the recording and the pictures, and the least for the
 recording; the number of attempts to keep the limit with more reserved."""
 LONGEST_VALUE = 160
@@ -93,7 +93,7 @@ def run_report(
     chosen, path, reserved = options or ReportOptions(), Path(to), RESERVED_BYTES
     with frames(file, world) as sequence:
         kept, result = KeptFrames(sequence), _result(Path(file), sequence.scene)
-        for _ in range(ATTEMPTS):
+        for _ in range(SIZE_ATTEMPTS):
             page = run_page(kept, chosen, result, reserved)
             content = page.html().encode()
             if len(content) <= 1e6 * chosen.limit:
