@@ -26,7 +26,7 @@ from tisim.numerics.vectors import normal_to
 
 ROUNDS = 60
 """Largest number of iterations from one normal."""
-APART = 0.5
+STEP_ASIDE = 0.5
 """Sideways displacement, over the radius of the body, of the further places from which a normal is sought."""
 END_SLACK = 0.1
 """Distance beyond the end of a cylinder or a cone, over half the thickness of a body, at which the body still
@@ -192,7 +192,7 @@ class CurvedWalls:
         sphere = axis.norm_sqr() == 0.0
         aside = ti.select(sphere, normal_to(first), axis.cross(first))
         other = first.cross(aside)
-        step = APART * s.radius[w, i]
+        step = STEP_ASIDE * s.radius[w, i]
         overlap, normal, x = 0.0 * place[0] - ti.math.inf, first, 0.0 * place
         for start in range(ti.select(sphere, 5, 3)):
             sign = ti.select(start % 2 == 1, step, -step)
