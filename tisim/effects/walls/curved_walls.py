@@ -24,9 +24,9 @@ from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.shape_contact import leaning
 from tisim.numerics.vectors import normal_to
 
-NORMAL_ROUNDS = 60
+ROUNDS = 60
 """Largest number of iterations from one normal."""
-SIDE_STEP = 0.5
+STEP_ASIDE = 0.5
 """Sideways displacement, over the radius of the body, of the further places from which a normal is sought."""
 END_SLACK = 0.1
 """Distance beyond the end of a cylinder or a cone, over half the thickness of a body, at which the body still
@@ -192,7 +192,7 @@ class CurvedWalls:
         sphere = axis.norm_sqr() == 0.0
         aside = ti.select(sphere, normal_to(first), axis.cross(first))
         other = first.cross(aside)
-        step = SIDE_STEP * s.radius[w, i]
+        step = STEP_ASIDE * s.radius[w, i]
         overlap, normal, x = 0.0 * place[0] - ti.math.inf, first, 0.0 * place
         for start in range(ti.select(sphere, 5, 3)):
             sign = ti.select(start % 2 == 1, step, -step)
@@ -200,7 +200,7 @@ class CurvedWalls:
             shift += ti.select(start > 2, sign, 0.0 * sign) * other
             n = self.tangent(place + shift, axis, planes)
             last, y, deep, rounds, moving = n, x, 0.0 * overlap, 0, 1
-            while moving == 1 and rounds < NORMAL_ROUNDS:
+            while moving == 1 and rounds < ROUNDS:
                 last, y = n, self.shapes.corner(s, w, i, corner, q, n)
                 deep = n.dot(place + y) - planes[2]
                 n = self.tangent(place + y, axis, planes)
