@@ -32,8 +32,8 @@ STEEL, WATER = (0.82, 0.83, 0.85), (0.35, 0.62, 0.85)
 def pictures(frames: Frames) -> Mapping[str, Figure]:
     """filter.png: the fibres, the streamlines and the captured colloids, and the course of the run."""
     last = frames[-1]
-    figure = empty(11.0, 5.6)
-    left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
+    figure = empty(9.8, 5.6)
+    left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
     draw_filter(figure, left, frames.scene, last.arrays, last.time)
     course(right, [frame.arrays for frame in frames], np.asarray(frames.times))
     letters((left, right))
