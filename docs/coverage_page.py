@@ -27,9 +27,7 @@ on another page.
 """  # noqa: E501
 MEANING = """
 *Works*: it is used in a scene, and a test or a check holds it. *In part*: some of it, or another size, or without a
-conclusion of the source; the row says which. *Left out*: not there, with the reason. {later} rows belong to a part
-of B16 that is not built yet: the filter of packed fibres (chapter 7).
-{laboratory} rows are laboratory work. Of the other {others} rows, {whole} work.
+conclusion of the source; the row says which. *Left out*: not there, with the reason. {laboratory} rows are laboratory work. Of the other {others} rows, {whole} work.
 """  # noqa: E501
 NUMBERS = r"""
 ± is half of a 95 % interval. Numbers with a star \* were printed by `tisim check` (physics version {physics},
@@ -49,13 +47,12 @@ def page() -> str:
 
 def _page(works: Sequence[Publication]) -> Iterator[str]:
     rows = [row for work in works for row in work.rows]
-    others = [row for row in rows if not (row.later or row.laboratory)]
+    others = [row for row in rows if not row.laboratory]
     yield from ("# Coverage of the publications", "", *_paragraph(INTRODUCTION))
     counts = [(f"[{work.name}](#{slug(_heading(work))})", *_cells(work.rows)) for work in works]
     yield from _table(("publication", *STATUS.values(), "rows"), [*counts, ("all", *_cells(rows))])
     yield from _paragraph(
         MEANING.format(
-            later=sum(row.later for row in rows),
             laboratory=sum(row.laboratory for row in rows),
             others=len(others),
             whole=sum(row.status == "works" for row in others),

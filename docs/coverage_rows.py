@@ -32,7 +32,7 @@ class Row:
     tests : FILE::TEST below tests/. checks : tables with ``case``, ``check``, and ``text``, in which {} is
     the number that the check measures. here : numbers, as they are written on ``page``. published : the
     number in the publication. command : prints the numbers or draws the figure. reason : why a row is in part
-    or left out, or how it differs. later : it belongs to a part of a publication that is not built yet.
+    or left out, or how it differs.
     laboratory : it is no simulation.
     """
 
@@ -48,7 +48,6 @@ class Row:
     published: str = ""
     command: str = ""
     reason: str = ""
-    later: bool = False
     laboratory: bool = False
 
     @classmethod

@@ -24,7 +24,7 @@ from tisim.describe import reference
 from tisim.describe.reference import Declaration, Entry
 
 PACKAGES = ("tisim", "tisim.effects", "tisim.sources", "tisim.operators", "tisim.steppers", "tisim.packing",
-            "tisim.shapes", "tisim.accuracy", "tisim.analysis", "tisim.optimize")  # fmt: skip
+            "tisim.shapes", "tisim.accuracy", "tisim.analysis", "tisim.report", "tisim.optimize")  # fmt: skip
 """Those with public names."""
 NAMES = {entry.name for entry in reference.entries()}
 """Of all parts, as scene files have them."""

@@ -73,6 +73,8 @@ EFFECTS = {
     f" {CONTACT}",
     "reaction": f"{HEATING}, Reaction(energy_density=1e3)",
     "rigid_clumps": f"RigidClumps(), {CONTACT}",
+    "rigid_mixture": "RigidMixture(rods=[SpherocylinderShape(length=2e-3, diameter=1e-3)],"
+    f" superquadrics=[SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3), exponents=(4, 4, 4))]), {GRANULAR}",
     "rigid_rods": f"RigidRods(rods=[SpherocylinderShape(length=2e-3, diameter=1e-3)]), {GRANULAR}",
     "rigid_superquadrics": "RigidSuperquadrics(superquadrics=[SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3),"
     f" exponents=(4, 4, 4))]), {GRANULAR}",
@@ -186,6 +188,17 @@ GIVEN = {
         ),
         position=[[0, 0, 0], [2.85e-3, 0, 2e-4]],
         velocity=[[0.1, 0, 0], [-0.1, 0, 0]],
+    )""",
+    "rigid_mixture": """particles=tisim.Particles.of_shapes(
+        (
+            SpherocylinderShape(length=2e-3, diameter=1e-3),
+            SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3), exponents=(4, 4, 4)),
+        ),
+        position=[[0, 0, 0], [1.49e-3, 0, 1e-4]],
+        velocity=[[0.1, 0, 0], [-0.1, 0, 0]],
+        orientation=[[1, 0, 0, 0], [0.8, 0.6, 0, 0]],
+        shape=[0, 1],
+        density=2500.0,
     )""",
     "rigid_rods": """particles=tisim.Particles.of_shapes(
         SpherocylinderShape(length=2e-3, diameter=1e-3),

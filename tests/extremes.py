@@ -83,6 +83,10 @@ COMMON: dict[str, dict[str, Any]] = {
     "rigid_superquadrics": {
         "superquadrics": [{"semi_axes": [1e-3, 7e-4, 2e-3], "exponents": [4.0, 2.0, 3.0]}]
     },
+    "rigid_mixture": {
+        "rods": [{"length": 2e-3, "diameter": 1e-3}],
+        "superquadrics": [{"semi_axes": [1e-3, 7e-4, 2e-3], "exponents": [4.0, 2.0, 3.0]}],
+    },
     "parallel_bond": {"gap": 1e-4, "young": 1e6, "tensile_strength": 1e6, "shear_strength": 1e6},
     "walls": {
         "planes": [{"point": [0.0, 0.0, -9e-4], "normal": [0.0, 0.0, 1.0]}],

@@ -46,6 +46,7 @@ def test_families_export_all_their_parts(family):
         "FilledPart",
         "FilledRegion",
         "GrainShapes",
+        "Mixture",
         "PackingStepper",
         "Rods",
         "Shaped",
@@ -55,7 +56,7 @@ def test_families_export_all_their_parts(family):
 
 
 @pytest.mark.parametrize(
-    "name", ["", *(f".{family}" for family in FAMILIES), ".accuracy", ".analysis", ".testing"]
+    "name", ["", *(f".{family}" for family in FAMILIES), ".accuracy", ".analysis", ".report", ".testing"]
 )
 def test_every_listed_name_exists(name):
     package = importlib.import_module(f"tisim{name}")

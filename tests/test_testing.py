@@ -22,6 +22,7 @@ from tisim.effects import (
     PermanentMoment,
     PrescribedMotion,
     RigidClumps,
+    RigidMixture,
     RigidRods,
     RigidSuperquadrics,
     Tether,
@@ -362,7 +363,7 @@ def test_a_field_that_only_others_declare_is_reported():
 # long to compile. Outflow weighs particles before it removes them. Permanent moments exclude soft ones. Tree
 # gravity has no images, which Ewald sums need. Rigid shapes exclude laws for spheres. Dipole forces go only
 # with mutual moments of the same cut-off.
-RODS, BRICKS = [RigidRods], [RigidSuperquadrics]
+RODS, BRICKS, MIXED = [RigidRods], [RigidSuperquadrics], [RigidMixture]
 HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 DIPOLES = [DipoleDipole, TruncatedDipoleDipole]
@@ -374,6 +375,7 @@ APART = (
     Virial,
     *RODS,
     *BRICKS,
+    *MIXED,
     *HOLDING,
     *IMAGED,
     *DIPOLES,
@@ -392,6 +394,7 @@ TOGETHER = [
         HOLDING,
         RODS,
         BRICKS,
+        MIXED,
         [PermanentMoment],
         *(pytest.param(kinds, marks=pytest.mark.slow) for kinds in (TOGETHER, DIPOLES, IMAGED)),
     ],
@@ -400,6 +403,7 @@ TOGETHER = [
         "constraints",
         "rods",
         "superquadrics",
+        "mixture",
         "permanent moments",
         "all that go together",
         "dipoles",

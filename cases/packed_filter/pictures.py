@@ -15,7 +15,7 @@ from tisim.io.reader import Frames
 from tisim.plotting.image import draw_solids
 from tisim.plotting.style import TIME, empty, letters, plain
 from tisim.rendering.solids import DrawnCylinders, DrawnRods, DrawnSpheres
-from tisim.sources import MagneticCylinders, sample
+from tisim.sources import FieldSampler, MagneticCylinders
 from tisim.sources.base import Source
 
 STREAMLINES = 5
@@ -32,8 +32,8 @@ STEEL, WATER = (0.82, 0.83, 0.85), (0.35, 0.62, 0.85)
 def pictures(frames: Frames) -> Mapping[str, Figure]:
     """filter.png: the fibres, the streamlines and the captured colloids, and the course of the run."""
     last = frames[-1]
-    figure = empty(11.0, 5.6)
-    left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
+    figure = empty(9.8, 5.6)
+    left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
     draw_filter(figure, left, frames.scene, last.arrays, last.time)
     course(right, [frame.arrays for frame in frames], np.asarray(frames.times))
     letters((left, right))
@@ -96,15 +96,16 @@ def streamlines(scene: Scene, unit: float) -> np.ndarray:
     x, y = np.meshgrid(low[0] + side * (high - low)[0], low[1] + side * (high - low)[1])
     place = np.stack([x.ravel(), y.ravel(), np.full(x.size, low[2] - 2 * unit)], axis=1)
     points, step = [place], LINE_STEP * unit
-    for _ in range(int((high[2] - low[2] + 4 * unit) / step * 1.3)):
-        # The midpoint rule, with steps of equal length.
-        half = points[-1] + 0.5 * step * _direction(scene, points[-1])
-        points.append(points[-1] + step * _direction(scene, half))
+    with FieldSampler(scene.effects, FLOW) as flow:
+        for _ in range(int((high[2] - low[2] + 4 * unit) / step * 1.3)):
+            # The midpoint rule, with steps of equal length.
+            half = points[-1] + 0.5 * step * _direction(flow, points[-1])
+            points.append(points[-1] + step * _direction(flow, half))
     return np.array(points)
 
 
-def _direction(scene: Scene, place: np.ndarray) -> np.ndarray:
-    velocity, _ = sample(scene.effects, FLOW, place)
+def _direction(flow: FieldSampler, place: np.ndarray) -> np.ndarray:
+    velocity, _ = flow(place)
     return np.asarray(velocity / np.maximum(np.linalg.norm(velocity, axis=1), 1e-300)[:, None])
 
 

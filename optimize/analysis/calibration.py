@@ -1,9 +1,10 @@
 """Calibration: the 95 % interval of each gene from measurements, and genes that cannot be distinguished.
 
-It needs a problem whose objective is the Misfit of measured quantities. A quadratic form is fitted to the
-chi^2 of the designs of the search (optimize.analysis.misfit_shape). It gives the estimate of each gene, its
-95 % interval and the correlations. The interval is a likelihood interval: it is valid if the uncertainties of
-the measurements are right and their errors are normal and independent.
+It needs a problem whose objective is the Misfit of measured quantities. The responses of the quantities to
+the genes, from the designs of the search, give the likelihood of the genes (optimize.analysis.likelihood):
+the estimate of each gene, its 95 % interval and the correlations. The interval is valid if the uncertainties
+of the measurements are right and their errors are normal and independent. It includes the error of the
+responses, which is large where few designs were run.
 """
 
 from __future__ import annotations
@@ -15,17 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_distribution
 
 from tisim.errors import Words, must
-from tisim.optimize.analysis.misfit_shape import (
-    NEAR_CHI2,
-    ONE_GENE_95,
-    Evidence,
-    MisfitShape,
-    coefficients,
-    fit,
-)
+from tisim.optimize.analysis.evidence import Evidence
+from tisim.optimize.analysis.likelihood import ONE_GENE_95, Likelihood
+from tisim.optimize.analysis.remarks import few_runs, remarks_on, undetermined
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.problem.feasibility import excess
 from tisim.optimize.problem.gene_values import Value, brief
@@ -35,24 +30,15 @@ from tisim.optimize.problem.statistic import Misfit
 
 Array = NDArray[np.float64]
 
-UNTOLD = 1.0
-"""A direction is undetermined if chi^2 grows less than this along it within the ranges of the genes."""
 _ALMOST_ALL = 0.95
 """A gene is undetermined if its interval covers a larger part of its range than this."""
-_TOGETHER = 0.9
-"""Correlations of two estimates from this magnitude on are mentioned in the remarks."""
-_LITTLE = 0.05
-"""A gene with a smaller share in the undetermined directions than this is not listed with them."""
-_UNLIKELY = 0.01
-"""If a chi^2 this large or larger has a lower probability, a remark says that the measurements are not
-met."""
 
 
 @dataclass(frozen=True)
 class GeneEstimate:
     """The estimate of a gene and its 95 % interval, in the unit of the gene.
 
-    estimate : the value of least chi^2.
+    estimate : the most likely value.
     low, high : ends of the 95 % interval.
     open_low, open_high : whether the interval extends to that end of the gene's range, and possibly beyond;
         it is then a one-sided bound.
@@ -100,10 +86,11 @@ class Calibration:
     choices : for each gene that is a choice, the choices of all designs whose chi^2 is less than 3.84 above
         the least.
     correlation : of the estimates, shape (genes, genes); NaN for an undetermined gene.
-    chi2 : the least chi^2, of ``measurements`` quantities.
-    designs : number of designs in the fit.
-    missing : number of further designs near the least misfit that are needed for a fit.
-    wanted : that number of designs, proposed for running.
+    chi2 : the least chi^2, of ``measurements`` quantities; the variances contain the errors of the responses.
+    designs : number of designs that the responses are known from.
+    missing : number of further designs near the least misfit that are needed for intervals.
+    wanted : designs proposed for running: that number; or the ends of intervals that are wide because few
+        designs were run there.
     remarks : sentences on genes that cannot be distinguished, and on reasons to doubt the intervals.
     """
 
@@ -140,34 +127,36 @@ def calibration(outcome: Outcome) -> Calibration:
     best = points[allowed][int(np.argmin(evidence.chi2[allowed]))]
     same = np.all(points[:, others] == best[others], axis=1)
     choices = _choices(problem, points[allowed], evidence.chi2[allowed], others)
-    shape = None
-    if numbers:
-        near = evidence.chi2[same], evidence.noise[same]
-        shape = fit(Evidence(points[same][:, numbers], *near, evidence.shift))
-    missing = 0
-    if numbers and shape is None:
-        missing = 2 * coefficients(len(numbers))
-        missing -= int(np.sum(evidence.chi2[same] < evidence.chi2.min() + NEAR_CHI2))
-    wanted = _wanted(problem, points[same], evidence.chi2[same], numbers, max(missing, 0))
-    if shape is None:
-        remarks = (
-            [f"Too few designs are near the least misfit: {missing} more are needed."] if numbers else []
-        )
+    near = evidence.of(same, numbers)
+    missing = near.missing if numbers else 0
+    if missing or not numbers:
+        words = f"Too few designs are near the least misfit: {missing} more are needed."
+        wanted = _wanted(problem, points[same], near.chi2, numbers, missing)
         return Calibration((), choices, np.empty((0, 0)), float(evidence.chi2.min()),
-                           measurements, 0, missing, wanted, tuple(remarks))  # fmt: skip
+                           measurements, 0, missing, wanted, (words,) if missing else ())  # fmt: skip
+    likelihood = Likelihood(near)
     searched = [genome.searched[k] for k in numbers]
-    estimates = tuple(_estimate(gene, shape, k) for k, gene in enumerate(searched))
+    ends = [likelihood.interval(k) for k in range(len(numbers))]
+    estimates = tuple(
+        _estimate(gene, *(float(at[k]) for at in (likelihood.best, *ends[k])))
+        for k, gene in enumerate(searched)
+    )
+    known = [one.name for one in estimates if one.told]
+    few, wide = few_runs(likelihood, tuple(measured.quantities), [end for pair in ends for end in pair])
+    to_run = np.tile(best, (len(wide), 1))
+    to_run[:, numbers] = np.reshape(wide, (len(wide), len(numbers)))
     return Calibration(
         genes=estimates,
         choices=choices,
-        correlation=_correlation(shape),
-        chi2=max(shape.least, 0.0),
+        correlation=_correlation(likelihood),
+        chi2=likelihood.chi2,
         measurements=measurements,
-        designs=shape.designs,
+        designs=likelihood.designs,
         missing=0,
-        wanted=(),
+        wanted=tuple(genome.decode(point) for point in to_run),
         remarks=(
-            *_remarks(measurements, shape, searched, estimates, evidence),
+            *remarks_on(likelihood, [gene.name for gene in searched], known),
+            *few,
             *_violating(outcome, evidence),
         ),
     )
@@ -200,12 +189,9 @@ def _evidence(outcome: Outcome, measured: Misfit) -> tuple[Array, Evidence]:
     return points, Evidence.of_quantities(points, off, bool(outcome.settings.ensemble.common_starts))
 
 
-def _estimate(gene: Searched, shape: MisfitShape, k: int) -> GeneEstimate:
-    low, high = shape.interval(k)
-    ends = max(low, 0.0), min(high, 1.0)
-    best = float(np.clip(shape.best[k], 0.0, 1.0))
-    at, bottom, top = (float(gene.decode(u)) for u in (best, *ends))
-    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, *ends)
+def _estimate(gene: Searched, best: float, low: float, high: float) -> GeneEstimate:
+    at, bottom, top = (float(gene.decode(u)) for u in (best, low, high))
+    return GeneEstimate(gene.name, gene.unit, at, bottom, top, low <= 0.0, high >= 1.0, best, low, high)
 
 
 def _choices(
@@ -232,79 +218,14 @@ def _wanted(
     return tuple(problem.genome.decode(u) for u in drawn)
 
 
-def _remarks(
-    measurements: int,
-    shape: MisfitShape,
-    genes: Sequence[Searched],
-    estimates: Sequence[GeneEstimate],
-    evidence: Evidence,
-) -> list[str]:
-    """Return remarks on genes that cannot be distinguished, and on reasons to doubt the intervals."""
-    remarks = []
-    growth, directions = shape.growth()
-    free = growth < UNTOLD
-    if np.any(free):
-        remarks += _untold(directions[:, free], float(growth[free].max()), genes)
-    known = {one.name for one in estimates if one.told}
-    for i, one in enumerate(genes):
-        for j, other in enumerate(genes[:i]):
-            rho = shape.correlation[i, j]
-            if abs(rho) > _TOGETHER and {one.name, other.name} <= known:
-                more = "less" if rho < 0 else "more"
-                remarks.append(
-                    f"{other.name} and {one.name} are hard to distinguish: more of one fits with {more} of "
-                    f"the other (correlation {rho:.2f})."
-                )
-    freedom = max(measurements - len(genes), 1)
-    if chi2_distribution.sf(shape.least / (1.0 + evidence.shift), freedom) < _UNLIKELY:
-        remarks.append(
-            f"The model does not meet all measurements: the least chi^2 is {shape.least:.3g} of "
-            f"{measurements} quantities. The intervals are valid only if it can."
-        )
-    if not np.any(evidence.noise) and shape.scatter > 1.0:
-        remarks.append(
-            f"chi^2 deviates from a quadratic form by {shape.scatter:.2g} (root mean square) for "
-            f"designs up to {shape.within:.3g} above the least: the intervals are approximate."
-        )
-    return remarks
-
-
-def _correlation(shape: MisfitShape) -> Array:
+def _correlation(likelihood: Likelihood) -> Array:
     """Return the correlations of the estimates, NaN for a gene that is undetermined by itself.
 
     Such a gene fits equally well at any value, and its small correlations with others are due to chance.
     """
-    growth, directions = shape.growth()
-    alone = (directions[:, growth < UNTOLD] ** 2).sum(axis=1) > 1.0 - _LITTLE
-    correlation = shape.correlation.copy()
+    alone, correlation = undetermined(likelihood), likelihood.correlation
     correlation[alone, :] = correlation[:, alone] = math.nan
     return correlation
-
-
-def _untold(directions: Array, grown: float, genes: Sequence[Searched]) -> list[str]:
-    """Return sentences that name the genes, or combinations of genes, that are undetermined.
-
-    directions : shape (genes, directions), of the unit cube; chi^2 changes by ``grown`` or less along them.
-    """
-    parts = (directions**2).sum(axis=1)
-    change = f"chi^2 changes by {grown:.2g} or less"
-    alone = [gene.name for gene, part in zip(genes, parts, strict=True) if part > 1.0 - _LITTLE]
-    told = [f"The measurements do not determine {_listed(alone)}: {change} over the range."] if alone else []
-    mixed = [k for k, part in enumerate(parts) if _LITTLE <= part <= 1.0 - _LITTLE]
-    if len(mixed) < 2:
-        return told
-    names = _listed([genes[k].name for k in mixed])
-    if directions.shape[1] - len(alone) > 1:
-        return [*told, f"{names} cannot be distinguished: {change} along several combinations of them."]
-    one = directions[mixed, int(np.argmax((directions[mixed] ** 2).sum(axis=0)))]
-    up = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] > 0]
-    down = [genes[k].name for k, part in zip(mixed, one, strict=True) if part * one[0] < 0]
-    goes = f"for more {_listed(up)} with less {_listed(down)}" if down else "if all increase together"
-    return [*told, f"{names} cannot be distinguished: {change} {goes}."]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def columns(result: Calibration) -> dict[str, list[Any]]:
@@ -330,7 +251,7 @@ def summary(result: Calibration) -> str:
         return "no intervals"
     return (
         f"least chi^2 {result.chi2:.3g} of {result.measurements} measured quantities, by "
-        f"{result.designs} designs near it"
+        f"{result.designs} designs"
     )
 
 

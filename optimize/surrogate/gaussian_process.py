@@ -112,8 +112,11 @@ class GaussianProcess:
 
         The posterior covariance is k(a, b) - half_solved(a).T @ half_solved(b).
         """
-        across = _matern(self.points, np.atleast_2d(points), self.parameters)
-        return solve_triangular(self._factor[0], across, lower=True, check_finite=False)
+        return self.whitened(_matern(self.points, np.atleast_2d(points), self.parameters))
+
+    def whitened(self, columns: Array) -> Array:
+        """Return L^-1 times the columns, shape (n, m), with L L^T the covariance of the noisy values."""
+        return np.asarray(solve_triangular(self._factor[0], columns, lower=True, check_finite=False))
 
     def left_out(self) -> tuple[Array, Array]:
         """Return the leave-one-out residual of each value and its standard deviation, both (n,), with the
@@ -133,6 +136,14 @@ class GaussianProcess:
     def covariance(self, points: Array, others: Array) -> Array:
         """Return the prior covariance of the function, shape (m, k), in standardised units."""
         return _matern(points, others, self.parameters)
+
+    def covariance_gradient(self, point: Array) -> Array:
+        """Return the gradient of the prior covariance of the function at a point with its value at each of
+        the points of the process, shape (n, features), in standardised units."""
+        off = point - self.points
+        root = np.sqrt(5.0 * ((off / self.parameters.lengths) ** 2).sum(axis=1))
+        slope = -self.parameters.signal * (5.0 / 3.0) * (1.0 + root) * np.exp(-root)
+        return np.asarray(slope[:, None] * off / self.parameters.lengths**2)
 
     @property
     def nugget(self) -> float:

@@ -33,6 +33,7 @@ from tisim.pairs.listed_pairs import LANES
 from tisim.shapes import EllipsoidShape, ParticleShape, SphereShape, SpherocylinderShape, SuperquadricShape
 from tisim.shapes.rod_pairs import closest_rods
 from tisim.shapes.superquadric_pairs import closest_superquadrics
+from tisim.shapes.superquadric_points import ELLIPSOIDS, SUPERQUADRICS
 
 CASES: dict[str, ParticleShape] = {
     "spheres": SphereShape(diameter=1.0),
@@ -122,7 +123,7 @@ def run_rods(pairs: ti.template(), sweeps: ti.i32):
 
 
 @ti.kernel
-def run_superquadrics(pairs: ti.template(), ellipsoids: ti.template(), far: ti.f64, sweeps: ti.i32):
+def run_superquadrics(pairs: ti.template(), family: ti.template(), far: ti.f64, sweeps: ti.i32):
     """Compute all pairs several times."""
     ti.loop_config(serialize=True)
     for _ in range(sweeps):
@@ -130,7 +131,7 @@ def run_superquadrics(pairs: ti.template(), ellipsoids: ti.template(), far: ti.f
         g = ti.Vector([ti.cast(one, float) for one in ti.static(pairs.exponents)])
         for m in range(pairs.count):
             gap, n, x, y = closest_superquadrics(
-                ellipsoids, vector(pairs.c, m), vector(pairs.p, m), a, g, vector(pairs.q, m), a, g, far
+                family, vector(pairs.c, m), vector(pairs.p, m), a, g, vector(pairs.q, m), a, g, far
             )
             pairs.out[0][m] = gap
             for k in ti.static(range(3)):
@@ -204,7 +205,7 @@ def measure(shape: ParticleShape, count: int, turns: int) -> list[str]:
         if pairs.rod is not None:
             run_rods(pairs, sweeps)
         else:
-            run_superquadrics(pairs, pairs.ellipsoid, far, sweeps)
+            run_superquadrics(pairs, ELLIPSOIDS if pairs.ellipsoid else SUPERQUADRICS, far, sweeps)
         ti.sync()
 
     near(1)

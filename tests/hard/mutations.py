@@ -82,9 +82,13 @@ SOFT_GRAINS = {
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[revised]",
     ),
     "hard_superquadrics": (
-        f"{CONTACT}/superquadrics.py", "return self.superquadrics.exponents(w, s.shape[w, i])",
-        "return 2.0 + 0.0 * self.superquadrics.exponents(w, s.shape[w, i])",
+        f"{CONTACT}/superquadrics.py", "return self.superquadrics.exponents(w, self",
+        "return 2.0 + 0.0 * self.superquadrics.exponents(w, self",
         "tests/steppers/packing/test_mechanical_contraction.py::test_an_attempt_equals_its_reference[cuboids]",
+    ),
+    "hard_mixture": (
+        f"{CONTACT}/mixture.py", "s.shape[w, i] - self.rod_shapes", "s.shape[w, i] - self.rod_shapes - 1",
+        "tests/steppers/packing/test_mixtures.py::test_an_attempt_equals_its_reference",
     ),
     "contact": (f"{CONTACT}/power_law.py", "0.5 * (self", "0.6 * (self", f"{LAWS}[contact]"),
     "hertz": (f"{CONTACT}/hertz.py", "4.0 / 3.0 * modulus", "1.3 * modulus", f"{LAWS}[hertz]"),
@@ -159,6 +163,11 @@ SHARED = {
         f"{MOTIONS}/rigid_superquadrics.py", "self.farthest(s, w, i, q, direction)",
         "0.99 * self.farthest(s, w, i, q, direction)",
         f"{SHAPES}a_brick_comes_to_rest_on_its_largest_face",
+    ),
+    "rods_beside_superquadrics": (
+        f"{MOTIONS}/rigid_mixture.py", "RigidRods.corner(self, s, w, i, c,",
+        "RigidRods.corner(self, s, w, i, 0 * c,",
+        "tests/effects/constraint/test_rigid_mixture.py::test_all_bodies_come_to_rest_on_a_floor",
     ),
     "mobility": (
         f"{LAW}/shape_contact.py", "(about / inertia).dot(about)", "0.9 * (about / inertia).dot(about)",

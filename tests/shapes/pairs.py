@@ -11,6 +11,7 @@ from tisim.numerics.vectors import rotation_matrix
 from tisim.shapes.rod_pairs import closest_rods, closest_spheres
 from tisim.shapes.superquadric import power_sum_root
 from tisim.shapes.superquadric_pairs import closest_superquadrics
+from tisim.shapes.superquadric_points import ROD, SUPERQUADRICS
 
 
 class Contact(NamedTuple):
@@ -70,14 +71,14 @@ Array = ti.types.ndarray()
 
 @ti.kernel
 def _superquadrics(
-    ellipsoids: ti.template(), c: Array, qi: Array, ai: Array, gi: Array, qj: Array, aj: Array, gj: Array,
+    family: ti.template(), c: Array, qi: Array, ai: Array, gi: Array, qj: Array, aj: Array, gj: Array,
     far: ti.f64, out: Array,
 ):  # fmt: skip
     for m in range(c.shape[0]):
         i = _vector(qi, m, 4), _vector(ai, m, 3), _vector(gi, m, 3)
         j = _vector(qj, m, 4), _vector(aj, m, 3), _vector(gj, m, 3)
         gap, normal, x, y = closest_superquadrics(
-            ellipsoids, _vector(c, m, 3), i[0], i[1], i[2], j[0], j[1], j[2], far
+            family, _vector(c, m, 3), i[0], i[1], i[2], j[0], j[1], j[2], far
         )
         _write(out, m, gap, normal, x, y)
 
@@ -115,14 +116,14 @@ def quaternions(turn):
 
 
 @in_taichi_thread
-def superquadric_contacts(separation, i, j, far=1e30, ellipsoids=False):
+def superquadric_contacts(separation, i, j, far=1e30, family=SUPERQUADRICS):
     """Contacts of superquadrics by the kernel."""
     out = np.zeros((len(separation), 10))
     shape_i, shape_j = (
         (quaternions(one.turn), np.ascontiguousarray(one.axes), np.ascontiguousarray(one.exponents))
         for one in (i, j)
     )
-    _superquadrics(ellipsoids, np.ascontiguousarray(separation), *shape_i, *shape_j, far, out)
+    _superquadrics(family, np.ascontiguousarray(separation), *shape_i, *shape_j, far, out)
     return _contact(out)
 
 
@@ -231,3 +232,40 @@ def searched_gap(rng, separation, i, j, directions=2000, kept=12, rounds=60):
             cap *= np.where(improved, 1.0, 0.5)
         best = np.maximum(best, value)
     return best
+
+
+class RodsOfPairs(NamedTuple):
+    """One rod of each pair, with the methods of ``Bodies``: orientation, half the length of its segment and
+    radius, shape (n,)."""
+
+    turn: Rotation
+    half: np.ndarray
+    radius: np.ndarray
+
+    @property
+    def axes(self):
+        return np.column_stack([self.radius, self.radius, self.half + self.radius])
+
+    @property
+    def exponents(self):
+        return np.tile([2.0, 2.0, ROD], (len(self.half), 1))
+
+    def support(self, direction):
+        e = self.turn.apply([0, 0, 1])
+        side = np.sign((e * direction).sum(axis=1))
+        return self.radius[:, None] * direction + (side * self.half)[:, None] * e
+
+    def away(self, point):
+        """Vectors to points from the nearest points of the segments."""
+        e = self.turn.apply([0, 0, 1])
+        along = np.clip((e * point).sum(axis=1), -self.half, self.half)
+        return point - along[:, None] * e
+
+    def level(self, point):
+        return np.linalg.norm(self.away(point), axis=1) / self.radius
+
+    def normal(self, point):
+        return unit(self.away(point))
+
+    def __getitem__(self, rows):
+        return RodsOfPairs(self.turn[rows], self.half[rows], self.radius[rows])

@@ -20,6 +20,7 @@ from tests.shapes.pairs import (
     unit,
 )
 from tisim.shapes import SuperquadricShape
+from tisim.shapes.superquadric_points import ELLIPSOIDS, SUPERQUADRICS
 
 FAILED = 1e-6
 """Sine of the angle to the common normal beyond which a pair has failed."""
@@ -162,7 +163,7 @@ def by_coal(separation, i, j):
 def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
     """coal ends its searches at a change of gap or depth of 1e-8, with normals to about the root of that."""
     i, j, separation, _, _ = random_pairs(rng, count, -0.3, 0.3, largest=2.0)
-    contact = superquadric_contacts(separation, i, j, ellipsoids=True)
+    contact = superquadric_contacts(separation, i, j, family=ELLIPSOIDS)
     gaps, normals = by_coal(separation, i, j)
     # coal gives no answer for one overlapping pair in some hundred, and a larger depth for one in 10,000.
     answered = np.abs(gaps) < 1e300
@@ -182,7 +183,9 @@ def test_gaps_of_ellipsoids_agree_with_coal(count, rng):
 
 def test_ellipsoids_have_a_code_path_of_their_own_with_the_same_results(rng):
     i, j, separation, _, _ = random_pairs(rng, 20_000, -0.3, 0.3, largest=2.0)
-    general, own = (superquadric_contacts(separation, i, j, ellipsoids=one) for one in (False, True))
+    general, own = (
+        superquadric_contacts(separation, i, j, family=one) for one in (SUPERQUADRICS, ELLIPSOIDS)
+    )
     for one, other in zip(own, general, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-8)
 
@@ -243,8 +246,8 @@ def test_spheres_are_superquadrics_of_equal_axes(rng):
     )
     separation = unit(rng.normal(size=(count, 3))) * rng.uniform(0.1, 3, (count, 1))
     expected = sphere_contacts(separation, radii[:, 0], radii[:, 1])
-    for ellipsoids in (False, True):
-        contact = superquadric_contacts(separation, i, j, ellipsoids=ellipsoids)
+    for family in (SUPERQUADRICS, ELLIPSOIDS):
+        contact = superquadric_contacts(separation, i, j, family=family)
         for one, other in zip(contact, expected, strict=True):
             np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
 

@@ -7,7 +7,7 @@ from tisim import InputError
 from tisim.backend import memory
 from tisim.backend.runtime import current
 from tisim.effects import Lorentz
-from tisim.sources import ElectricField, MagneticField, MagneticSpheres, Sphere, sample
+from tisim.sources import ElectricField, FieldSampler, MagneticField, MagneticSpheres, Sphere, sample
 
 
 def test_sum_of_the_sources_of_one_quantity():
@@ -35,6 +35,18 @@ def test_sum_of_the_sources_of_one_quantity():
             np.testing.assert_allclose(
                 gradient[:, axis], difference, rtol=1e-5, atol=1e-6 * np.abs(slope).max()
             )
+
+
+def test_a_sampler_is_called_many_times():
+    """At other points and times it gives what ``sample`` gives, and it frees its memory."""
+    before = len(memory.in_use())
+    field = (MagneticField(amplitude=(0.5, 0, 0), omega=(np.pi, 0, 0)),)
+    with FieldSampler(field, "magnetic_flux_density") as sampler:
+        for time, points in ((0.5, np.zeros((1, 3))), (0.25, np.ones((20, 3)))):
+            again, expected = sampler(points, time), sample(field, "magnetic_flux_density", points, time)
+            for one, other in zip(again, expected, strict=True):
+                np.testing.assert_array_equal(one, other)
+    assert len(memory.in_use()) == before
 
 
 def test_nothing_to_sample_and_points_of_another_shape():

@@ -1,4 +1,4 @@
-"""The commands ``tisim plot``, ``movie``, ``export`` and ``figures`` show the results of runs."""
+"""The commands ``tisim plot``, ``report``, ``movie``, ``export`` and ``figures`` show the results of runs."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from tisim.cli.options import (
     nameable,
 )
 from tisim.console import err, progress_bar
-from tisim.errors import InputError
+from tisim.errors import InputError, must
 from tisim.files import output_folder, pictures, regular_file
 from tisim.files.output_folder import resumes
 from tisim.streams import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from matplotlib.figure import Figure
 
@@ -103,7 +103,6 @@ def plot(
 
 def _pictures(trajectory: Frames, look: Look) -> dict[str, Figure]:
     """Return the figures of a trajectory by the names of their files."""
-    from tisim.cases.case import every
     from tisim.plotting import loads, time_series
 
     drawn = {
@@ -112,12 +111,79 @@ def _pictures(trajectory: Frames, look: Look) -> dict[str, Figure]:
     }
     if loads.bodies(trajectory):
         drawn["loads.png"] = loads.loads(trajectory)
-    case = every().get(trajectory.scene.name)
-    if case and case.pictures:
-        drawn |= case.pictures(trajectory)
+    drawn |= _case_pictures(trajectory)
     for figure in drawn.values():
         time_series.mark_missing(figure, trajectory)
     return drawn
+
+
+def _case_pictures(trajectory: Frames) -> Mapping[str, Figure]:
+    """Return the figures that the case of a run draws of it, by the names of their files."""
+    from tisim.cases.case import every
+
+    case = every().get(trajectory.scene.name)
+    return case.pictures(trajectory) if case and case.pictures else {}
+
+
+def report(
+    file: File,
+    to: Annotated[
+        Path | None,
+        typer.Option(
+            "--to",
+            metavar="NAME.html",
+            callback=nameable,
+            help="File to write; report.html in the folder of FILE by default.",
+        ),
+    ] = None,
+    world: World = 0,
+    fields: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--field", metavar="NAME", help="A quantity of particles for colours; all by default. Repeatable."
+        ),
+    ] = None,
+    limit: Annotated[
+        float, typer.Option(metavar="MB", help="Largest size of the file; frames are left out to keep it.")
+    ] = 15.0,
+    contacts: Annotated[
+        bool, typer.Option("--contacts/--no-contacts", help="Store the contacts of grains.")
+    ] = True,
+    checks: Annotated[
+        Path | None,
+        typer.Option(
+            "--checks",
+            metavar="FILE.csv",
+            callback=nameable,
+            help="Checks that 'tisim check --out' has written.",
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+    plugins: Plugins = None,
+) -> None:
+    """Write a page that shows a run: one HTML file, to open in a browser without a network.
+
+    It shows the particles in three dimensions and in motion, the scene, time series and balances, and the
+    pictures of the case.
+    """
+    from tisim.io.reader import frames
+    from tisim.plotting.time_series import mark_missing
+    from tisim.report.run_report import ReportOptions, read_checks, run_report
+
+    file = _trajectory_file(file)
+    path = to or file.parent / "report.html"
+    must(path.suffix in (".html", ".htm"), "--to", "a file NAME.html", str(path))
+    with frames(file, world) as trajectory, pictures.drawing(f"pictures of {file}"):
+        found = _case_pictures(trajectory) if len(trajectory) > 1 else {}
+        drawn = {
+            name.removesuffix(".png").replace("_", " "): pictures.image(mark_missing(figure, trajectory))
+            for name, figure in found.items()
+        }
+        _print_missing(trajectory.missing)
+    options = ReportOptions(limit, fields or None, contacts, drawn, read_checks(checks) if checks else ())
+    output_folder.claim(path.parent, (path.name,), overwrite)
+    with err().status("writing"):
+        print(run_report(file, path, world, options))
 
 
 def figures(

@@ -22,10 +22,10 @@ COMMANDS = (
     run.run, describe.cases, describe.explain, check.check, hard.hard, describe.doctor, effects.effects,
     new.new,
     cost.cost, search.optimize, search.compare, search.cache,
-    inspect.plot, inspect.figures, inspect.movie, inspect.export,
+    inspect.plot, inspect.report, inspect.figures, inspect.movie, inspect.export,
 )  # fmt: skip
 """The command functions, in the order of ``tisim --help``; each function name is the command name."""
-WRITERS = ("run", "new", "cost", "optimize", "compare", "plot", "figures", "movie", "export")
+WRITERS = ("run", "new", "cost", "optimize", "compare", "plot", "report", "figures", "movie", "export")
 """Commands whose results are files; they succeed even if standard output cannot be written."""
 
 app = typer.Typer(

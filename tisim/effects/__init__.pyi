@@ -45,6 +45,7 @@ from .base import (
 )
 from .constraint.prescribed_motion import PrescribedMotion as PrescribedMotion
 from .constraint.rigid_clumps import RigidClumps as RigidClumps
+from .constraint.rigid_mixture import RigidMixture as RigidMixture
 from .constraint.rigid_rods import RigidRods as RigidRods
 from .constraint.rigid_shapes import RigidShapes as RigidShapes
 from .constraint.rigid_superquadrics import RigidSuperquadrics as RigidSuperquadrics
@@ -114,6 +115,7 @@ from .contact.granular.twisting import (
 )
 from .contact.granular.viscoelastic import ViscoelasticDamping as ViscoelasticDamping
 from .contact.granular.viscous import ViscousFriction as ViscousFriction
+from .contact.hard_mixture import HardMixture as HardMixture
 from .contact.hard_rods import HardRods as HardRods
 from .contact.hard_superquadrics import HardSuperquadrics as HardSuperquadrics
 from .contact.hertz import Hertz as Hertz

@@ -96,6 +96,7 @@ class Barrel(RevolvedSurface):
     """Contract of a surface around a section of an axis, which may be closed at both ends."""
 
     contract: ClassVar[bool] = True
+    envelope: ClassVar[bool] = True
 
     start: Vector = parameter("m", "start of the axis", (0.0, 0.0, 0.0))
     end: Vector = parameter("m", "end of the axis", examples=[(0.0, 0.0, 1.0)])
@@ -120,3 +121,20 @@ class Barrel(RevolvedSurface):
 
     def generator(self) -> tuple[Vector, Vector, float, float, float]:
         return self.start, self._along(), math.hypot(*self._along()), *self.radii()
+
+    def tangent_planes(self) -> tuple[np.ndarray, np.ndarray, tuple[float, float, float, float]]:
+        origin, direction, length, low, high = self.generator()
+        across, along = length / math.hypot(high - low, length), (low - high) / math.hypot(high - low, length)
+        return (
+            np.array(origin),
+            np.array(direction) / math.hypot(*direction),
+            (across, along, across * low, length),
+        )
+
+    @ti.func
+    def tangents(self, w, k):
+        low, length = self.low_radius(w, k), self.length(w, k)
+        wide = self.high_radius(w, k) - low
+        size = ti.sqrt(wide * wide + length * length)
+        across, along = length / size, -wide / size
+        return self.origin(w, k), self.axis(w, k), ti.Vector([across, along, across * low, length])

@@ -1,5 +1,7 @@
 """The surface of a sphere, and the distance from a ball."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from tisim.backend.taichi import ti
@@ -25,6 +27,8 @@ class SphericalSurface(Surface):
     The point nearest to r is c + R (r - c) / |r - c|.
     """
 
+    envelope: ClassVar[bool] = True
+
     centre: Vector = parameter("m", "centre c", (0.0, 0.0, 0.0))
     radius: float = parameter("m", "radius R", examples=[0.1], gt=0)
 
@@ -37,6 +41,14 @@ class SphericalSurface(Surface):
     def distances(self, places: np.ndarray) -> np.ndarray:
         away: np.ndarray = np.linalg.norm(places - np.array(self.centre), axis=1) - self.radius
         return np.abs(away)
+
+    def tangent_planes(self) -> tuple[np.ndarray, np.ndarray, tuple[float, float, float, float]]:
+        return np.array(self.centre), np.zeros(3), (1.0, 0.0, self.radius, 0.0)
+
+    @ti.func
+    def tangents(self, w, k):
+        centre, zero = self.centre(w, k), 0.0 * self.radius(w, k)
+        return centre, 0.0 * centre, ti.Vector([zero + 1.0, zero, self.radius(w, k), zero])
 
     @ti.func
     def nearest(self, w, k, c, r):

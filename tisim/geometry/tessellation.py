@@ -55,6 +55,8 @@ def _(shape: BoxSurface) -> np.ndarray:
 def _(shape: SphericalSurface) -> np.ndarray:
     polar = np.linspace(0, np.pi, SPHERE_RINGS + 1)
     profile = shape.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1)
+    # The triangles at the poles share their corner to the last bit.
+    profile[[0, -1], 0] = 0.0
     return _revolved(profile, np.array(shape.centre), np.array([0.0, 0.0, 1.0]))
 
 

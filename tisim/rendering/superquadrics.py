@@ -11,7 +11,7 @@ import numpy as np
 from tisim.rendering.camera import Raster
 from tisim.rendering.solids import SMALLEST_DRAWN, Solids, Splats
 
-ROUNDS = 30
+RAY_STEPS = 30
 """Largest number of Newton's steps along a ray; 3 to 8 are usual."""
 ON_SURFACE = 1e-5
 """A point counts as on the surface if the sum of powers differs from 1 by less."""
@@ -73,7 +73,7 @@ class DrawnSuperquadrics(Solids):
         rows = np.flatnonzero(z >= low)
         q, e, z, low = [a[rows] for a in q], [a[rows] for a in e], z[rows], low[rows]
         g = [self.exponents[k[rows], c] for c in range(3)]
-        for _ in range(ROUNDS):
+        for _ in range(RAY_STEPS):
             level, slope = -1.0, 0.0
             for a, b, power in zip(q, e, g, strict=True):
                 place = a + z * b

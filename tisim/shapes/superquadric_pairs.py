@@ -1,4 +1,5 @@
-"""The shortest distance of two superquadrics by Newton's method for the common normal.
+"""The shortest distance of two superquadrics, or of a rod and a superquadric, by Newton's method for the
+common normal.
 
 The distance between the planes of normal n that touch both bodies, one from each side, is
 
@@ -22,7 +23,7 @@ next step of Newton finds the point of contact on the face.
 
 from tisim.backend.taichi import ti
 from tisim.numerics.vectors import conjugate, product, rotated, rotation_matrix
-from tisim.shapes.superquadric_points import constants, support
+from tisim.shapes.superquadric_points import ELLIPSOIDS, ROD, WITH_RODS, constants, support
 from tisim.shapes.superquadric_steps import LARGEST_STEP, NOT_ZERO, step_in_positions
 
 MOST_EVALUATIONS = 200
@@ -47,13 +48,15 @@ PLANE_ROUNDING = 4e-15
 DEEP_OVERLAP = 0.1
 """Depth of an overlap, relative to the smallest semi-axis, beyond which further starts are tried. Of 200,000
 random pairs, the first start missed the largest d of none up to a depth of 0.21 and of one in 100 at 0.35."""
+START_EXPONENT = 5
+"""Exponents are at most this where the normals of bodies are estimated for the first start."""
 MOST_STARTS = 17
 """The sum of three normals, the ellipsoid's normal, six axes, and nine products of axes."""
 
 
 @ti.func
 def closest_superquadrics(
-    ellipsoids: ti.template(),  # type: ignore[valid-type]
+    family: ti.template(),  # type: ignore[valid-type]
     separation,
     q_i,
     semi_axes_i,
@@ -66,7 +69,8 @@ def closest_superquadrics(
     """Return gap (m), unit normal from i to j, and the points of contact (m), each relative to the centre of
     its particle.
 
-    ellipsoids : True if all exponents of a scene are 2; they are then not read. separation : centre of j
+    family : of all bodies of a scene (``superquadric_points``): exponents of ellipsoids are not read, and
+        bodies may be rods if it is WITH_RODS. separation : centre of j
         minus centre of i (m). q_i, q_j : unit quaternions of the orientations. semi_axes_i, semi_axes_j : m.
         exponents_i, exponents_j : from 2 to 20. far : gap (m) beyond which pairs do not interact.
 
@@ -85,13 +89,13 @@ def closest_superquadrics(
     c, turn = rotated(conjugate(p_i), c0), rotation_matrix(product(conjugate(p_i), p_j))
     enough, size = ti.cast(far, ti.f64), ti.min(a_i.min(), a_j.min())
     # The first start of ellipsoids is the second of others.
-    initial = ti.static(1 if ellipsoids else 0)
+    initial = ti.static(1 if family == ELLIPSOIDS else 0)
     best, start = ti.cast(0.0, ti.f64), initial
     n, x_i, x_j = 0.0 * c, 0.0 * c, 0.0 * c
     while start < MOST_STARTS and (start == initial or best < -DEEP_OVERLAP * size):
         # With steps in positions from all starts, one in a million deep overlaps missed the largest d.
-        first = _start(c, turn, a_i, g_i, a_j, g_j, start)
-        value, normal, y_i, y_j = _ascend(ellipsoids, c, turn, a_i, g_i, a_j, g_j, first, enough, start == 0)
+        first = _start(c, turn, a_i, _of_start(family, g_i), a_j, _of_start(family, g_j), start)
+        value, normal, y_i, y_j = _ascend(family, c, turn, a_i, g_i, a_j, g_j, first, enough, start == 0)
         if start == initial or value > best:
             best, n, x_i, x_j = value, normal, y_i, y_j
         start += 1
@@ -100,6 +104,24 @@ def closest_superquadrics(
     unit, point_i, point_j = 0.0 * separation, 0.0 * separation, 0.0 * separation
     unit, point_i, point_j = rotated(p_i, n), rotated(p_i, x_i), rotated(p_i, x_j)
     return gap, unit, point_i, point_j
+
+
+@ti.func
+def _of_start(family: ti.template(), g):  # type: ignore[valid-type]
+    """Return the exponents from which the normal of a body is estimated; a rod is flat along its segment."""
+    powers = g
+    if ti.static(family == WITH_RODS):
+        powers = ti.select(g == ROD, 1.0 * START_EXPONENT, g)
+    return powers
+
+
+@ti.func
+def _at_least_2(family: ti.template(), g):  # type: ignore[valid-type]
+    """Return the exponents for steps in positions; the normal of a rod is changed as Newton's step says."""
+    powers = g
+    if ti.static(family == WITH_RODS):
+        powers = ti.max(g, 2.0)
+    return powers
 
 
 @ti.func
@@ -139,12 +161,12 @@ def _start(c, turn, a_i, g_i, a_j, g_j, start):
 def _normal_near(u, a, g):
     """Return nearly the unit normal of a body in the direction of the point a_k u_k from its centre.
 
-    Exponents above 5 are replaced by 5, and |u|^(g - 1) is interpolated between whole powers.
+    Exponents above START_EXPONENT are replaced by it, and |u|^(g - 1) is interpolated between whole powers.
     """
     size = 1.0 / ti.max(ti.abs(u).max(), NOT_ZERO)
     n = g / a * u
     for k in ti.static(range(3)):
-        for whole in ti.static(range(2, 5)):
+        for whole in ti.static(range(2, START_EXPONENT)):
             part = ti.min(ti.max(g[k] - whole, 0.0), 1.0)
             n[k] *= 1.0 - part + part * size * ti.abs(u[k])
     return n / ti.max(n.norm(), NOT_ZERO)
@@ -158,7 +180,7 @@ def _unit(like, k):
 
 
 @ti.func
-def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far, in_positions):  # type: ignore[valid-type]
+def _ascend(family: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far, in_positions):  # type: ignore[valid-type]
     """Return a maximum of d (m), its normal, and the points of contact relative to both centres (m), in the
     frame of i.
 
@@ -167,14 +189,14 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far, 
     size = ti.min(a_i.min(), a_j.min())
     noise = PLANE_ROUNDING * (a_i.sum() + a_j.sum() + ti.abs(c).sum())
     back = turn.transpose()
-    body_i, body_j = constants(ellipsoids, a_i, g_i), constants(ellipsoids, a_j, g_j)
+    body_i, body_j = constants(family, a_i, g_i), constants(family, a_j, g_j)
     normal, trial, step, change = start, start, 0.0 * start, 0.0 * start
     x_i, x_j = 0.0 * c, 0.0 * c
     value, predicted, part = 0.0 * size, 0.0 * size, 0.0 * size
     pending, rounds, bent = 1, 0, 0
     while pending == 1 and rounds < MOST_EVALUATIONS:
-        h_i, s_i, d_i, v_i, f_i = support(ellipsoids, trial, body_i)
-        h_j, s_j, d_j, v_j, f_j = support(ellipsoids, back @ trial, body_j)
+        h_i, s_i, d_i, v_i, f_i = support(family, trial, body_i)
+        h_j, s_j, d_j, v_j, f_j = support(family, back @ trial, body_j)
         d = c.dot(trial) - h_i - h_j
         if rounds == 0 or d >= value + REQUIRED_SHARE * part * predicted - noise:
             normal, value = trial, d
@@ -215,13 +237,11 @@ def _ascend(ellipsoids: ti.template(), c, turn, a_i, g_i, a_j, g_j, start, far, 
                 x_j = turn @ (-s_j - d_j * step_j + f_j * v_j.dot(step_j) * v_j)
                 normal = _scaled_to_1(normal + step)
             change, bent = part * step, 0
-            if ti.static(not ellipsoids):  # noqa: SIM102
+            if ti.static(family != ELLIPSOIDS):  # noqa: SIM102
                 if pending == 1 and in_positions:
-                    along, here, there = (
-                        part * ti.Vector([s_t, s_u]),
-                        (normal, d_i, g_i),
-                        (back @ normal, d_j, g_j),
-                    )
+                    along = part * ti.Vector([s_t, s_u])
+                    here = normal, d_i, _at_least_2(family, g_i)
+                    there = back @ normal, d_j, _at_least_2(family, g_j)
                     change, bent = step_in_positions(along, (t, u), (t_j, u_j), here, there)
         elif bent == 1:
             change, bent = part * step, 0

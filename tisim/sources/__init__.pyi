@@ -24,6 +24,7 @@ from .pore_flow.solids import SolidSphere as SolidSphere
 from .pore_flow.stokes_flow import StokesFlow as StokesFlow
 from .pore_flow.stokes_flow import permeability_tensor as permeability_tensor
 from .pore_flow.stokes_flow import stokes_flow as stokes_flow
+from .sampling import FieldSampler as FieldSampler
 from .sampling import sample as sample
 from .switched import Switched as Switched
 from .uniform import ElectricField as ElectricField

@@ -1,7 +1,7 @@
 """The field of sources at given points, as it acts on particles of a scene."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,31 +52,61 @@ class _Sum:
                         out[first * tile + lane, 1 + c, a] = gradient[3 * a + c][lane]
 
 
+class FieldSampler:
+    """The sum of all sources of a quantity among effects at any points, compiled once for many calls.
+
+        with FieldSampler(effects, "flow_velocity") as flow:
+            velocity, gradient = flow(points)
+
+    quantity : its standard name, such as "magnetic_flux_density" (T). InputError is raised if it has no
+    source. The memory of the device is freed at the end of the block.
+    """
+
+    def __init__(self, effects: Sequence[Effect], quantity: str) -> None:
+        self.real = runtime.current().real
+        sources = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
+        must(bool(sources), "effects", f"with a source of {quantity}", [effect.label for effect in effects])
+        self._bind(sources)
+
+    @in_taichi_thread
+    def _bind(self, sources: Sequence[Source]) -> None:
+        with collected() as self.trees:
+            table = ParameterTable(sources, 1, self.real)
+            bound = connected([table.bind(source) for source in sources])
+            table.write([sources])
+            self.sum = _Sum(bound)
+
+    def __call__(self, points: ArrayLike, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the field, shape (n, 3), and its gradient, shape (n, 3, 3), at points (m, shape (n, 3)) and
+        a time (s); see ``sample``."""
+        places = np.ascontiguousarray(points, np.float64 if self.real == ti.f64 else np.float32)
+        must(places.ndim == 2 and places.shape[1] == 3, "points", "of shape (n, 3)", places.shape)
+        out = np.zeros((len(places), 4, 3), places.dtype)
+        self._at(time, places, out)
+        return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
+
+    @in_taichi_thread
+    def _at(self, time: float, places: np.ndarray, out: np.ndarray) -> None:
+        self.sum.at(time, places, out)
+
+    def __enter__(self) -> Self:
+        return self
+
+    @in_taichi_thread
+    def __exit__(self, *failure: object) -> None:
+        for tree in self.trees:
+            tree.destroy()
+
+
 def sample(
     effects: Sequence[Effect], quantity: str, points: ArrayLike, time: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the sum of all sources of a quantity among effects, shape (n, 3), and its gradient, (n, 3, 3).
 
     quantity : its standard name, such as "magnetic_flux_density" (T). points : m, shape (n, 3). time : s.
-    [k, a, b] of the gradient is the derivative of component a along axis b, per metre.
+    [k, a, b] of the gradient is the derivative of component a along axis b, per metre. Each call compiles a
+    kernel; use ``FieldSampler`` to call it more often.
     InputError is raised if the quantity has no source, or for points of another shape.
     """
-    real = runtime.current().real
-    places = np.ascontiguousarray(points, np.float64 if real == ti.f64 else np.float32)
-    must(places.ndim == 2 and places.shape[1] == 3, "points", "of shape (n, 3)", places.shape)
-    sources = [effect for effect in effects if isinstance(effect, Source) and effect.quantity == quantity]
-    must(bool(sources), "effects", f"with a source of {quantity}", [effect.label for effect in effects])
-    out = np.zeros((len(places), 4, 3), places.dtype)
-    _sample(sources, real, time, places, out)
-    return out[:, 0].astype(float), np.swapaxes(out[:, 1:], 1, 2).astype(float)
-
-
-@in_taichi_thread
-def _sample(sources: Sequence[Source], real: Any, time: float, places: np.ndarray, out: np.ndarray) -> None:
-    with collected() as trees:
-        table = ParameterTable(sources, 1, real)
-        bound = connected([table.bind(source) for source in sources])
-        table.write([sources])
-        _Sum(bound).at(time, places, out)
-    for tree in trees:
-        tree.destroy()
+    with FieldSampler(effects, quantity) as field:
+        return field(points, time)

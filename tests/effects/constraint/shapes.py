@@ -2,12 +2,12 @@
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import lsq_linear, minimize
+from scipy.optimize import lsq_linear, minimize, minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from tests.scenes import fixed
 from tisim import Particles, Scene
-from tisim.effects import RigidRods, RigidSuperquadrics
+from tisim.effects import RigidMixture, RigidRods, RigidSuperquadrics
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
 
 D, DENSITY = 1e-3, 2500.0
@@ -20,12 +20,15 @@ LYING = Rotation.from_rotvec([0, np.pi / 2, 0]).as_quat(scalar_first=True)
 
 
 def moving(body, place, effects=(), dt=1e-6, steps=1, density=DENSITY, **more):
-    """Bodies of one shape, or of several of a kind; ``particles`` are given to Particles.of_shapes."""
+    """Bodies of one shape, or of several, rods first; further arguments are those of Particles.of_shapes."""
     names = ("velocity", "orientation", "angular_velocity", "shape", "size", "quantities")
     given = {name: more.pop(name) for name in names if name in more}
     shapes = body if isinstance(body, tuple) else (body,)
-    rods = isinstance(shapes[0], SpherocylinderShape)
-    law = RigidRods(rods=shapes) if rods else RigidSuperquadrics(superquadrics=shapes)
+    rods = tuple(one for one in shapes if isinstance(one, SpherocylinderShape))
+    others = shapes[len(rods) :]
+    law = RigidRods(rods=rods) if rods else RigidSuperquadrics(superquadrics=others)
+    if rods and others:
+        law = RigidMixture(rods=rods, superquadrics=others)
     return Scene(
         particles=Particles.of_shapes(shapes, place, density, **given),
         effects=(law, *effects),
@@ -90,6 +93,46 @@ def gap(shape, separation, turns):
     return -best.fun * D, n, here, there
 
 
+def gap_beside_rod(shapes, separation, turns):
+    """The same for a rod and a superquadric that overlap by less than the radius of the rod.
+
+    Where the rod touches between its ends the common normal is across its axis e, at the angle of the largest
+    d; otherwise the sphere at one of its ends touches.
+    """
+    rod, body = shapes
+    half, radius, e = rod.length / 2, rod.radius, turns[0].apply([0, 0, 1])
+    u = np.linalg.svd(e[None])[2][1]
+    across = np.stack([u, np.cross(e, u)])
+
+    def point(n):
+        return turns[1].apply(body.support(turns[1].inv().apply(-n)))
+
+    def apart(n, along):
+        return n @ (separation + point(n)) - along * (n @ e) - radius
+
+    def at(angle):
+        return np.cos(angle) * across[0] + np.sin(angle) * across[1]
+
+    first = np.arctan2(*(across @ separation)[::-1])
+    best = minimize_scalar(
+        lambda x: -apart(at(x), 0.0) / D, bounds=(first - 1.5, first + 1.5), method="bounded",
+        options={"xatol": 1e-12},
+    )  # fmt: skip
+    n = at(best.x)
+    along = (separation + point(n)) @ e
+    if abs(along) > half:
+        along = np.clip(along, -half, half)
+        frame = np.linalg.svd((separation - along * e)[None])[2]
+        frame[0] *= np.sign(frame[0] @ separation)
+
+        def unit(x):
+            n = frame[0] + x[0] * frame[1] + x[1] * frame[2]
+            return n / np.linalg.norm(n)
+
+        n = unit(minimize(lambda x: -apart(unit(x), along) / D, [0, 0], options={"gtol": 1e-11}).x)
+    return apart(n, along), n, along * e + radius * n, point(n)
+
+
 def turning(shape, x, v, turns, spins, contact=gap, h=1e-7):
     """Angular velocity (rad/s) of the normal of a contact, by central differences over h (s)."""
     ahead, behind = (
@@ -100,11 +143,13 @@ def turning(shape, x, v, turns, spins, contact=gap, h=1e-7):
 
 
 def reference(scene, shape, push, time, grip=0.0, contact=gap):
-    """Position, velocity, rotation and angular momentum of two equal bodies after a time (s), by an ODE
-    solver. They repel each other by ``push(overlap)`` (N) along the normal, and stick by a spring ``grip``
-    (N/m), which rotates with the normal and, about it, with the mean of both spins."""
-    start = scene.start()
-    mass, moments = start["mass"][0], start["mass"][0] * shape.moments()
+    """Position, velocity, rotation and angular momentum of two bodies after a time (s), by an ODE solver.
+    ``shape`` is the shape of both, or two shapes. They repel each other by ``push(overlap)`` (N) along the
+    normal, and stick by a spring ``grip`` (N/m), which rotates with the normal and, about it, with the mean
+    of both spins."""
+    start, shapes = scene.start(), shape if isinstance(shape, tuple) else (shape, shape)
+    mass = start["mass"][:, None]
+    moments = mass * [one.moments() for one in shapes]
 
     def split(y):
         x, v, q, momenta = (part.reshape(2, -1) for part in np.split(y[:26], [6, 12, 20]))

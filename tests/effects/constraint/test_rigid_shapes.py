@@ -65,7 +65,7 @@ def material(**changes):
     return {"grain": Material(**{**USUAL, **changes})}
 
 
-def colliding(shape, law=ELASTIC, dt=1e-6, time=4e-3, **changes):
+def colliding(body, law=ELASTIC, dt=1e-6, time=4e-3, **changes):
     """Two bodies that run into each other off centre, spinning."""
     given = {
         "velocity": [(0.3, 0.02, 0), (-0.3, 0.01, 0.05)],
@@ -75,7 +75,7 @@ def colliding(shape, law=ELASTIC, dt=1e-6, time=4e-3, **changes):
     }
     place = [(-1.5e-3, 0, 0), (1.5e-3, 0.3e-3, 0.2e-3)]
     more = {"materials": material(), **given}
-    return moving(shape, place, (law,), dt, round(time / dt), **more)
+    return moving(body, place, (law,), dt, round(time / dt), **more)
 
 
 def top(shape, spin, dt, steps):
@@ -420,7 +420,7 @@ REFUSED = {
     "drag": ({"effects": (StokesDrag(viscosity=1.0),)}, "effects.stokes_drag must be a law for bodies"),
     "a disc": (
         {"effects": (LAW, Walls(discs=[Disc(normal=(0, 0, 1), radius=0.1)]))},
-        "effects.walls must be made of planes, with effects.rigid_rods; received 'discs'",
+        "effects.walls must be made of planes, spheres, and open cylinders and cones, with effects.rigid",
     ),
     "no such shape": ({"shape": 1}, "particles.shape must be indices of the 1 shapes"),
     "prescribed motion": (

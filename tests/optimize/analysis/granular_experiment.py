@@ -13,7 +13,8 @@ import numpy as np
 
 from tisim import optimize
 from tisim.optimize import Gene, Misfit, Objective, Problem
-from tisim.optimize.analysis.misfit_shape import Evidence, fit
+from tisim.optimize.analysis.evidence import Evidence
+from tisim.optimize.analysis.likelihood import Likelihood
 
 GENES = (
     Gene("friction", "", 0.05, 1.0),
@@ -25,22 +26,25 @@ UNCERTAINTY = np.array([1.0, 0.02, 2.0, 0.02])
 """Uncertainties of the sliding angle (degrees), rebound, angle of repose (degrees) and rate (kg/s)."""
 
 
-def quantities(points, number=4):
-    """The first ``number`` quantities at points of the unit cube, shape (..., quantities)."""
+def quantities(points, number=4, curved=False):
+    """The first ``number`` quantities at points of the unit cube, shape (..., quantities).
+
+    curved : whether the angle of repose and the rate are curved functions of both frictions, as of real
+        heaps.
+    """
     friction, rolling, restitution = np.moveaxis(LOW + np.asarray(points) * (HIGH - LOW), -1, 0)
-    all_four = (
-        np.degrees(np.arctan(friction)),
-        restitution**2,
-        60.0 * rolling + 6.0 * friction,
-        0.33 - 0.4 * rolling - 0.03 * friction,
-    )
+    straight = 60.0 * rolling + 6.0 * friction, 0.33 - 0.4 * rolling - 0.03 * friction
+    saturating = 40.0 * (1.0 - np.exp(-5.0 * rolling * (0.3 + friction)))
+    bulk = (saturating, 0.2 + 0.5 / (1.0 + 8.0 * rolling + 2.0 * friction)) if curved else straight
+    all_four = np.degrees(np.arctan(friction)), restitution**2, *bulk
     return np.stack(all_four, axis=-1)[..., :number]
 
 
-def right_widths(truth, number):
+def right_widths(truth, number, curved=False):
     """Widths of the exact 95 % intervals, in units of the ranges; needs three quantities or more."""
     steps = 1e-5 * np.eye(3)
-    slopes = (quantities(truth + steps, number) - quantities(truth, number)) / 1e-5 / UNCERTAINTY[:number]
+    moved, here = quantities(truth + steps, number, curved), quantities(truth, number, curved)
+    slopes = (moved - here) / 1e-5 / UNCERTAINTY[:number]
     return 2 * 1.96 * np.sqrt(np.diag(np.linalg.inv(slopes @ slopes.T)))
 
 
@@ -49,11 +53,11 @@ def measured_objective(wanted):
     return Objective("misfit", lambda result: result.value, statistic=Misfit(wanted))
 
 
-def synthetic(seed, number=4, inside=(0.2, 0.8)):
+def synthetic(seed, number=4, inside=(0.2, 0.8), curved=False):
     """A true design and synthetic measurements of it: (truth, data, rng)."""
     rng = np.random.default_rng(seed)
     truth = rng.uniform(*inside, 3)
-    return truth, quantities(truth, number) + UNCERTAINTY[:number] * rng.normal(size=number), rng
+    return truth, quantities(truth, number, curved) + UNCERTAINTY[:number] * rng.normal(size=number), rng
 
 
 def cloud(rng, misfits, runs=300, size=10):
@@ -70,8 +74,27 @@ def cloud(rng, misfits, runs=300, size=10):
     return np.vstack(points)
 
 
-def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8)):
-    """(truth, intervals, exact widths) for a data set, from an archive of 300 designs.
+def crowded(seed, spread=40, close=170, starts=2, width=0.02):
+    """(truth, intervals, exact widths) for a data set, from an archive like that of a surrogate's search.
+
+    spread, close : numbers of designs over the whole ranges, and within ``width`` of the best design.
+
+    Heap and rate, which are curved functions of both frictions, have a noise of one uncertainty in each run;
+    the single grains have none. The close designs therefore do not tell how heap and rate depend on the
+    genes; only the others do.
+    """
+    truth, data, rng = synthetic(seed, curved=True)
+    best = truth + 0.03 * rng.normal(size=3)
+    points = np.vstack([rng.uniform(0, 1, (spread, 3)), best + width * rng.normal(size=(close, 3))])
+    points = np.clip(points, 0.0, 1.0)
+    means = (quantities(points, curved=True) - data) / UNCERTAINTY
+    off = means[:, None] + [0.0, 0.0, 1.0, 1.0] * rng.normal(size=(len(points), starts, 4))
+    found = intervals(Evidence.of_quantities(points, off, False))
+    return truth, found, right_widths(truth, 4, curved=True)
+
+
+def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8), runs=300):
+    """(truth, intervals, exact widths) for a data set, from an archive of ``runs`` designs.
 
     tau : noise of the random starts in each quantity, in uncertainties.
     """
@@ -85,15 +108,21 @@ def interval_of(seed, number=4, tau=0.0, starts=1, common=True, inside=(0.2, 0.8
         off.append((quantities(points, number)[:, None] - data) / sigma + own)
         return (off[-1].mean(axis=1) ** 2).sum(axis=-1)
 
-    points = cloud(rng, misfits)
-    shape = fit(Evidence.of_quantities(points, np.concatenate(off), common))
-    return truth, np.array([shape.interval(k) for k in range(3)]), right_widths(truth, number)
+    points = cloud(rng, misfits, runs)
+    found = intervals(Evidence.of_quantities(points, np.concatenate(off), common))
+    return truth, found, right_widths(truth, number)
 
 
-def coverage(data_sets, **settings):
+def intervals(evidence):
+    """The 95 % interval of each gene, shape (genes, 2)."""
+    likelihood = Likelihood(evidence)
+    return np.array([[end[k] for end in likelihood.interval(k)] for k in range(evidence.points.shape[1])])
+
+
+def coverage(data_sets, archive=interval_of, **settings):
     """Fraction of the intervals of each gene that contain the truth, and their mean width over the exact
     width."""
-    found = [interval_of(k, **settings) for k in range(data_sets)]
+    found = [archive(k, **settings) for k in range(data_sets)]
     truths, intervals, right = map(np.array, zip(*found, strict=True))
     inside = (intervals[..., 0] <= truths) & (truths <= intervals[..., 1])
     return inside.mean(axis=0), np.ptp(intervals, axis=2).mean(axis=0) / right.mean(axis=0)

@@ -261,5 +261,5 @@ def test_a_sum_in_a_box(rng):
 
 
 def test_a_box_without_extent_is_refused(rng):
-    with pytest.raises(InputError, match="magnetic_cylinders.sum_box must be a lower and an upper corner"):
+    with pytest.raises(InputError, match=r"magnetic_cylinders\.sum_box must be a lower and an upper corner"):
         MagneticCylinders(cylinders=fibres(rng, 2), sum_digits=3, sum_box=((0, 0, 0), (1e-3, 0, 1e-3)))

@@ -108,7 +108,7 @@ def reference_walls(container, side, shape, treatment, seen):
                     z = direction(outward)
                     virtual = Rotation.from_matrix(np.stack([outward, np.cross(z, outward), z], axis=1))
                     other = radius - distance(place - end)[0] if half else -np.inf
-                    exact, (depth, normal, here, _) = depth, contact(shape, beyond, turn, virtual)
+                    exact, (depth, normal, here, _) = depth, contact((shape, shape), beyond, turn, virtual)
                     seen.append((depth - exact, exact >= other and not container.curved))
                 found.append((depth, -normal, here))
         return found

@@ -87,7 +87,9 @@ def pair(d, turn_i, turn_j, size_i, size_j, shape):
         return [one[0] for one in superquadric_contacts(d[None], i, j)]
     # The segments of both are scaled to one length along their axes.
     half, thick, z = shape.length / 2, shape.diameter / 2, [0.0, 0.0, 1.0]
-    _, normal, here, there = rod_contact(d, size_i * turn_i.apply(z), size_j * turn_j.apply(z), half, 0.0)
+    _, normal, here, there = rod_contact(
+        d, size_i * turn_i.apply(z), size_j * turn_j.apply(z), (half, 0.0), (half, 0.0)
+    )
     gap = normal @ (d + there - here) - thick * (size_i + size_j)
     return gap, normal, here + thick * size_i * normal, there - thick * size_j * normal
 

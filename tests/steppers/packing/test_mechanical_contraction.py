@@ -5,13 +5,14 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-from tests.shapes.pairs import Bodies, superquadric_contacts
+from tests.shapes.pairs import Bodies, RodsOfPairs, superquadric_contacts
 from tests.steppers.packing.bits import resumed, same_bits
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.effects import Gravity
 from tisim.effects.contact.hard_rods import HardRods
 from tisim.effects.contact.hard_superquadrics import HardSuperquadrics
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
+from tisim.shapes.superquadric_points import SUPERQUADRICS, WITH_RODS
 from tisim.steppers import FixedStep, Verlet
 from tisim.steppers.packing.mechanical_contraction import MechanicalContraction
 
@@ -47,30 +48,38 @@ def scene(shape, number, fraction=0.05, seed=0, duration=1000.0, **settings):
     )
 
 
-def contact(shape, separation, turn_i, turn_j, size=1.0):
-    """Overlap, normal from i to j, and points of contact of two bodies.
+def contact(shapes, separation, turn_i, turn_j, size=1.0):
+    """Overlap, normal from i to j, and points of contact of two bodies of two shapes.
 
     Those of superquadrics come from their kernel, which tests/shapes compares with other means.
     """
-    if shape.superquadric():
-        axes, exponents = np.array(shape.superquadric())[:, None]
-        i, j = (Bodies(Rotation.concatenate([turn]), size * axes, exponents) for turn in (turn_i, turn_j))
-        found = superquadric_contacts(separation[None], i, j)
-        return -found.gap[0], found.normal[0], found.point_i[0], found.point_j[0]
-    axis_i, axis_j = (turn.apply([0.0, 0.0, 1.0]) for turn in (turn_i, turn_j))
-    return rod_contact(separation, axis_i, axis_j, size * shape.length / 2, size * shape.diameter / 2)
+    if not any(shape.superquadric() for shape in shapes):
+        axis_i, axis_j = (turn.apply([0.0, 0.0, 1.0]) for turn in (turn_i, turn_j))
+        sizes = [(size * shape.length / 2, size * shape.diameter / 2) for shape in shapes]
+        return rod_contact(separation, axis_i, axis_j, *sizes)
+    bodies, family = [], SUPERQUADRICS
+    for shape, turn in zip(shapes, (turn_i, turn_j), strict=True):
+        one = Rotation.concatenate([turn])
+        if shape.superquadric():
+            bodies.append(Bodies(one, *(np.array(shape.superquadric())[:, None] * [[[size]], [[1.0]]])))
+        else:
+            rod, family = size * np.array([[shape.length / 2], [shape.radius]]), WITH_RODS
+            bodies.append(RodsOfPairs(one, *rod))
+    found = superquadric_contacts(separation[None], *bodies, family=family)
+    return -found.gap[0], found.normal[0], found.point_i[0], found.point_j[0]
 
 
-def rod_contact(separation, axis_i, axis_j, half, radius):
-    """The same for two rods, by least squares within bounds."""
+def rod_contact(separation, axis_i, axis_j, rod_i, rod_j):
+    """The same for two rods, given by half the lengths of their segments and their radii, by least squares
+    within bounds."""
     # Both ends lie on segments: least squares within bounds, by an active set, which is exact.
-    axes = np.stack([axis_i, -axis_j], axis=1)
-    best = lsq_linear(axes, separation, (-half - 1e-300, half + 1e-300), method="bvls", tol=1e-15)
-    a, b = best.x
+    axes, limits = np.stack([axis_i, -axis_j], axis=1), np.array([rod_i[0], rod_j[0]]) + 1e-300
+    a, b = lsq_linear(axes, separation, (-limits, limits), method="bvls", tol=1e-15).x
     apart = separation + b * axis_j - a * axis_i
     distance = np.linalg.norm(apart)
     normal = apart / distance
-    return 2 * radius - distance, normal, a * axis_i + radius * normal, b * axis_j - radius * normal
+    here, there = a * axis_i + rod_i[1] * normal, b * axis_j - rod_j[1] * normal
+    return rod_i[1] + rod_j[1] - distance, normal, here, there
 
 
 def attempt(
@@ -78,19 +87,21 @@ def attempt(
 ):
     """Positions and orientations after one attempt to remove the overlaps; B16 (2.7)-(2.10), (3.6)-(3.13).
 
-    walls : function of the place and the rotation of a body that returns its overlaps with walls: depth,
-    normal along which it leaves the wall, and point of contact.
+    shape : the shape of all bodies, or one for each. walls : function of the place and the rotation of a body
+    that returns its overlaps with walls: depth, normal along which it leaves the wall, and point of contact.
     """
     x, turns = state["position"], Rotation.from_quat(state["orientation"], scalar_first=True)
-    number, mass = len(x), shape.volume()
+    number = len(x)
+    shapes = shape if isinstance(shape, list) else [shape] * number
     touching = [[] for _ in range(number)]
     for i in range(number):
         for j in range(i):
             d = x[j] - x[i]
             d -= np.where(periodic, side * np.round(d / side), 0)
-            if np.linalg.norm(d) > 2 * shape.bounding_radius():
+            both = shapes[i], shapes[j]
+            if np.linalg.norm(d) > sum(one.bounding_radius() for one in both):
                 continue
-            depth, normal, here, there = contact(shape, d, turns[i], turns[j])
+            depth, normal, here, there = contact(both, d, turns[i], turns[j])
             if depth > tolerance:
                 touching[i].append((depth, -normal, here))
                 touching[j].append((depth, normal, there))
@@ -107,15 +118,15 @@ def attempt(
         weights = [depth * (1 - depth) if method == "original" else 1.0 for depth in depths]
         push = sum(weight * n for weight, (_, n, _) in zip(weights, contacts, strict=True))
         twist = sum(weight * np.cross(r, n) for weight, (_, n, r) in zip(weights, contacts, strict=True))
-        body = orientations[i]
-        tensor = body @ np.diag(mass * shape.moments()) @ body.T
+        body, mass, moments = orientations[i], shapes[i].volume(), shapes[i].moments()
+        tensor = body @ np.diag(mass * moments) @ body.T
         if method == "revised":
             spin = np.linalg.solve(tensor, twist)
             multiplier = np.sqrt(0.5 * (push @ push / mass + twist @ spin))
             step = dt * min(depth for depth, _, _ in contacts) / multiplier
             shift, turn = step * push / mass, step * spin
         else:
-            spin = twist / shape.moments()[0]
+            spin = twist / moments[0]
             rates = [((push + np.cross(spin, r)) @ n) / depth for depth, n, r in contacts]
             step = beta / max(rates)
             shift, turn = step * push, step * spin
@@ -164,7 +175,7 @@ def deepest(state, side, shape, size, periodic=(True, True, True)):
         d = x[:i] - x[i]
         d -= np.where(periodic, side * np.round(d / side), 0)
         for j in np.flatnonzero(np.linalg.norm(d, axis=1) < 2 * size):
-            depths.append(contact(shape, d[j], turns[i], turns[j], scaled)[0] / unit)
+            depths.append(contact((shape, shape), d[j], turns[i], turns[j], scaled)[0] / unit)
     return max(depths)
 
 

@@ -81,6 +81,24 @@ class Shaped(Effect):
         sizes: np.ndarray = start["radius"] / bounding[start[SHAPE.name].astype(int)]
         return sizes
 
+    def thicknesses(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return half the smallest extent (m) of each body of a start, shape (n,)."""
+        thickness = np.array([one.half_extents().min() for one in self.shapes()])
+        half: np.ndarray = thickness[start[SHAPE.name].astype(int)] * self.sizes(start)
+        return half
+
+    def farthest_points(self, start: Mapping[str, np.ndarray], direction: np.ndarray) -> np.ndarray:
+        """Return the points (m) of the bodies of a start that are farthest along their unit vectors, relative
+        to their centres, shape (n, 3). direction : one for each, shape (n, 3), or one for all."""
+        turns = Rotation.from_quat(start[ORIENTATION.name], scalar_first=True)
+        inside = turns.apply(direction, inverse=True)
+        points = np.zeros((len(start["mass"]), 3))
+        for k, shape in enumerate(self.shapes()):
+            these = start[SHAPE.name].astype(int) == k
+            points[these] = shape.support(inside[these])
+        farthest: np.ndarray = turns.apply(points * self.sizes(start)[:, None])
+        return farthest
+
     @ti.func
     def size(self, s, w, i):
         """Return the size of a body over the size of its shape."""
@@ -115,3 +133,13 @@ class Shaped(Effect):
         q_i, q_j = self.turn(s, w, i), self.turn(s, w, j)
         found, _normal, _here, _there = self.between(s, w, i, j, q_i, q_j, separation, gap)
         return found > gap
+
+    @ti.func
+    def beside_rod(self, s, w, i, q, separation, axis, half, radius):
+        """Return the gap (m) between a body and a rod, the unit normal from the body to the rod, and the
+        point of contact of the body (m), relative to its centre.
+
+        q : orientation of the body. separation : centre of the rod minus centre of the body (m). axis : unit
+        vector along the rod; 0 for a sphere. half : half the length of its segment (m). radius : m.
+        """
+        return separation[0], separation, separation

@@ -81,9 +81,9 @@ class RigidShapes(Shaped, Constraint):
             rule = f"without inserted particles, with effects.{self.label}"
             must(not isinstance(effect, AddsParticles), name, rule, effect.kind())
             if isinstance(effect, Walls):
-                rule = f"made of planes, with effects.{self.label}"
-                others = ", ".join(effect.kinds_of_surface()) or "surface"
-                must(not effect.touches_surfaces, name, rule, others)
+                rule = f"made of planes, spheres, and open cylinders and cones, with effects.{self.label}"
+                others = ", ".join(effect.not_for_shapes())
+                must(not others, name, rule, others)
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
         self.check_shapes(start)

@@ -32,14 +32,19 @@ class Rods(Shaped):
         return rotated(q, ti.Vector([0.0 * q[0], 0.0 * q[0], 1.0 + 0.0 * q[0]]))
 
     @ti.func
+    def rod_index(self, s, w, i):
+        """Return the index of the shape of a body among the rods."""
+        return s.shape[w, i]
+
+    @ti.func
     def half(self, s, w, i):
         """Return half the length (m) of the segment of a rod."""
-        return 0.5 * self.size(s, w, i) * self.rods.length(w, s.shape[w, i])
+        return 0.5 * self.size(s, w, i) * self.rods.length(w, self.rod_index(s, w, i))
 
     @ti.func
     def rod_radius(self, s, w, i):
         """Return the radius (m) of a rod."""
-        return 0.5 * self.size(s, w, i) * self.rods.diameter(w, s.shape[w, i])
+        return 0.5 * self.size(s, w, i) * self.rods.diameter(w, self.rod_index(s, w, i))
 
     @ti.func
     def between(self, s, w, i, j, q_i, q_j, separation, far):
@@ -52,3 +57,9 @@ class Rods(Shaped):
             self.half(s, w, j),
             self.rod_radius(s, w, j),
         )
+
+    @ti.func
+    def beside_rod(self, s, w, i, q, separation, axis, half, radius):
+        own = self.axis(q), self.half(s, w, i), self.rod_radius(s, w, i)
+        gap, normal, here, _there = closest_rods(separation, own[0], own[1], own[2], axis, half, radius)
+        return gap, normal, here

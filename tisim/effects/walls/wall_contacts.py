@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.spring import tilted
+from tisim.effects.walls.curved_walls import CurvedWalls
 from tisim.effects.walls.wall_ring import WallRing
 from tisim.effects.walls.wall_search import CONTACTS, WallSearch
 
@@ -14,7 +15,7 @@ CAUTION = 1e-6
 rounding."""
 
 
-class WallContacts(WallRing, WallSearch):
+class WallContacts(CurvedWalls, WallRing, WallSearch):
     """Wall contacts compute the forces of a bound wall on the grains that touch it.
 
     laws : each contact law with the position of its values in the history of a contact, and their number;
@@ -57,7 +58,13 @@ class WallContacts(WallRing, WallSearch):
                         force, torque = force + push, torque + turn
             if ti.static(self.touches_surfaces or self.motion.moves):
                 clear = self.from_planes(w, r)
-                if ti.static(self.touches_surfaces):
+                if ti.static(self.touches_surfaces and self.shaped):
+                    push, turn, number, beside = self.touch_envelopes(s, w, i, r, before, t, dt, commit)
+                    force, torque, touching = force + push, torque + turn, touching + number
+                    clear = ti.min(clear, beside)
+                    if touching == 0 and self.may_have_passed(s, w, i, beside, t, dt):
+                        force[0] = ti.math.nan
+                elif ti.static(self.touches_surfaces):
                     number, found, beside = self.contacts(s, w, i, r, self.reach(s, w, i))
                     push, turn = self.touch_surfaces(s, w, i, number + before, number, found, t, dt, commit)
                     force, torque, touching = force + push, torque + turn, touching + number

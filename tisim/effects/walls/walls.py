@@ -117,8 +117,12 @@ class Walls(WallContacts, UsesMaterials, Force):
         return self.motion.top_speed(extent)
 
     def failure_hint(self, effects: Sequence[Effect], domain: Domain) -> str:
-        laws = (law.failure_hint(effects, domain) for law in effects if isinstance(law, GranularContact))
-        return ", or ".join(filter(None, laws))
+        hints = [law.failure_hint(effects, domain) for law in effects if isinstance(law, GranularContact)]
+        if self.touches_surfaces and any(isinstance(one, Shaped) and one.moves for one in effects):
+            hints.append(
+                "a body with a shape touches a rim, or a cone from outside, for which there is no law"
+            )
+        return ", or ".join(filter(None, hints))
 
     def material_index(self, materials: Materials) -> int:
         """Return the index of the material of the walls among the materials of a scene."""
@@ -127,6 +131,18 @@ class Walls(WallContacts, UsesMaterials, Force):
     def kinds_of_surface(self) -> Iterator[str]:
         """Yield the names of the non-empty lists of surfaces."""
         return (name for name, kind in self.lists() if issubclass(kind, Surface) and getattr(self, name))
+
+    def not_for_shapes(self) -> Iterator[str]:
+        """Yield the names of the surfaces that bodies with shapes cannot touch: those that are no planes,
+        spheres, open cylinders or open cones."""
+        for name, kind in self.lists():
+            rows = getattr(self, name)
+            if rows and issubclass(kind, Surface) and not kind.envelope:
+                yield name
+            elif any(getattr(shape, "closed", False) for shape in rows):
+                yield f"closed {name}"
+        if self.surface is not None:
+            yield "surface"
 
     @property
     def touches_surfaces(self) -> bool:
@@ -141,6 +157,10 @@ class Walls(WallContacts, UsesMaterials, Force):
         deepest: np.ndarray = radius - np.min([shape.distances(places) for shape in shapes], axis=0)
         return deepest
 
+    def envelopes(self) -> list[Surface]:
+        """Return the surfaces that bodies with shapes touch."""
+        return [one for _, one in self._named_shapes() if isinstance(one, Surface) and one.envelope]
+
     def required_world_fields(self) -> tuple[WorldField, ...]:
         kept = self.motion.quantities.items()
         measures = (WorldField(f"{self.label}_{name}", "measure", unit) for name, unit in kept)
@@ -148,14 +168,23 @@ class Walls(WallContacts, UsesMaterials, Force):
 
     def memory_fields(self, effects: Sequence[Effect]) -> tuple[Field, ...]:
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
-        corners = max((one.corners for one in effects if isinstance(one, Shaped)), default=1)
+        moving = [one for one in effects if isinstance(one, Shaped) and one.moves]
+        corners = moving[0].corners if moving else 1
         slots = {"past": Plane.list_capacity(len(self.planes)) * corners * values, "loads": 6}
-        if self.touches_surfaces:
+        if self.touches_surfaces and moving:
+            slots["surface_past"] = self._rows()[-1] * corners * values
+        elif self.touches_surfaces:
             slots["surface_past"] = CONTACTS * (3 + values)
         if self.touches_surfaces or self.motion.moves:
             slots["clear"] = 5
         fields = (Field(f"{self.label}_{n}", "", 1, "keep", slots=size) for n, size in slots.items() if size)
         return *fields, Field(f"{self.label}_touched", "", 1, "keep", integer=True)
+
+    def _rows(self) -> list[int]:
+        """Return the number of rows in the memory of the lists of surfaces before each list, and of all."""
+        kinds = dict(self.lists())
+        rows = [kinds[name].list_capacity(len(getattr(self, name))) for name in self.kinds_of_surface()]
+        return [0, *np.cumsum(rows).tolist()]
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         laws, begin = [], 0
@@ -175,6 +204,8 @@ class Walls(WallContacts, UsesMaterials, Force):
             "flat": bound.planes,
             "has_planes": bool(self.planes),
             "faces": faces,
+            "envelopes": tuple(zip(surfaces, self._rows(), strict=False)),
+            "envelope_rows": self._rows()[-1],
             "bundling": Bundling(faces),
             "doubting": Doubting(),
             "has_mesh": self.surface is not None,

@@ -1,0 +1,131 @@
+"""Recordings that are written without a run, and a browser that shows their reports."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tisim import Box, Particles, Scene
+from tisim.io.reader import Frame
+from tisim.io.trajectory import Trajectory, recorded_fields
+
+SWITCHES = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL2 without a graphics card."""
+
+
+def particles(n, **fields):
+    """A start of n equal spheres."""
+    given = {"position": np.zeros((n, 3)), "velocity": np.zeros((n, 3)), "radius": 1e-3, "mass": 1e-6}
+    return Particles(**given | fields)
+
+
+def scene(n=4, **settings):
+    """Particles in a periodic box of 2 cm, without effects."""
+    return Scene(
+        **{"particles": particles(n), "domain": Box(low=(-0.01,) * 3, high=(0.01,) * 3), "duration": 1.0}
+        | settings
+    )
+
+
+@pytest.fixture
+def record(tmp_path):
+    """Write a trajectory of frames, each a dict of arrays (``id`` and ``position`` at least)."""
+
+    def write(of_scene, frames, name="trajectory.h5", measures=()):
+        path = tmp_path / name
+        with Trajectory(path, [of_scene]) as file:
+            for k, given in enumerate(frames):
+                n = len(given["id"])
+                arrays = {
+                    field.name: np.full(field.shape(n), 1e-3 if field.name in ("radius", "mass") else 0.0)
+                    for field in recorded_fields(of_scene)
+                }
+                arrays = {name: np.asarray(given.get(name, values)) for name, values in arrays.items()}
+                file.write(0, Frame(k * 0.01, k, arrays, measures[k] if measures else {}))
+        return path
+
+    return write
+
+
+def executable(driver):
+    """The browser of the system, or the one that Playwright has installed; None if there is neither."""
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    own = driver.chromium.executable_path
+    return found or (own if Path(own).exists() else None)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """A browser with WebGL2; the test is skipped if there is none."""
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="needs pip install playwright (the extra browser)"
+    )
+    with playwright.sync_playwright() as driver:
+        path = executable(driver)
+        if path is None:
+            pytest.skip("no chromium: install one, or run python -m playwright install chromium")
+        chromium = driver.chromium.launch(executable_path=path, args=SWITCHES)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a page as a file, and wait until it is ready. At the end no script may have failed, and no request
+    may have left the page."""
+    problems = []
+
+    @contextmanager
+    def show(path, width=1000, height=800, **settings):
+        context = browser.new_context(viewport={"width": width, "height": height}, **settings)
+        page = context.new_page()
+        page.on(
+            "console", lambda said: problems.append(said.text) if said.type in ("error", "warning") else None
+        )
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        address = Path(path).as_uri()
+        page.on(
+            "request",
+            lambda request: (
+                None
+                if request.url.startswith(("data:", "blob:")) or request.url == address
+                else problems.append(f"request of {request.url}")
+            ),
+        )
+        page.goto(address)
+        page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
+        try:
+            yield page
+        finally:
+            context.close()
+
+    yield show
+    assert problems == []
+
+
+@pytest.fixture
+def touching(record, rng):
+    """Grains that touch, across periodic faces too: the file, and for each frame the overlaps (m) by ids."""
+    from tisim import Material
+    from tisim.effects import Granular
+
+    grains = scene(
+        40,
+        materials={"glass": Material(young=1e7, poisson=0.25, restitution=0.5, friction=0.5)},
+        effects=(Granular(),),
+    )
+    made, expected, place = [], [], rng.uniform(-0.01, 0.01, (40, 3))
+    for k in range(6):
+        ids = np.array([one for one in range(40) if one != 7 or k not in (2, 3)])
+        place = np.mod(place + rng.normal(0, 3e-4, (40, 3)) + 0.01, 0.02) - 0.01
+        radius = np.full(len(ids), 2e-3)
+        made.append({"id": ids, "position": place[ids], "radius": radius})
+        apart = place[ids][:, None] - place[ids]
+        depth = 4e-3 - np.linalg.norm(apart - 0.02 * np.rint(apart / 0.02), axis=2)
+        pairs = np.argwhere(np.triu(depth >= 0, 1))
+        expected.append({(int(ids[i]), int(ids[j])): float(depth[i, j]) for i, j in pairs})
+    return record(grains, made), expected

@@ -1,0 +1,129 @@
+"""The HTML of a report: a page of one file that needs no network.
+
+A policy in its head forbids the browser all connections, and all scripts and styles except the page's own,
+which it names by their hashes. Text of users is escaped; data are JSON in which "<" is written as an escape,
+so that no text ends the element that holds them.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+from tisim.version import __version__
+
+SCRIPTS = ("trajectory.js", "viewer.js", "player.js", "chart.js", "page.js")
+"""The scripts of a page, in order."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of a page: its name in the address, its title, and its HTML."""
+
+    name: str
+    title: str
+    html: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page.
+
+    title : text. state : "ok", "failed" or "unfinished". verdict, summary : text beside and below the title.
+    notices : sentences above the view. sections : in order. footer : paragraphs.
+    facts : plain data for the scripts. recording : bytes for them.
+    """
+
+    title: str
+    state: str
+    verdict: str
+    summary: str
+    facts: Mapping[str, Any]
+    recording: bytes
+    notices: Sequence[str] = ()
+    sections: Sequence[Section] = ()
+    footer: Sequence[str] = field(default_factory=tuple)
+
+    def html(self) -> str:
+        """Return the page as HTML."""
+        style, script = static("page.css"), f'"use strict";\n{"".join(map(static, SCRIPTS))}'
+        policy = (
+            f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; img-src data: blob:; "
+            "base-uri 'none'; form-action 'none'"
+        )
+        links = "".join(f'<a href="#{one.name}">{escape(one.title)}</a>' for one in self.sections)
+        return Template(static("page.html")).substitute(
+            policy=policy,
+            version=escape(__version__),
+            title=escape(self.title),
+            style=style,
+            state=escape(self.state),
+            verdict=escape(self.verdict),
+            summary=escape(self.summary),
+            links=links,
+            notices="\n".join(
+                f'<p class="warning {escape(self.state)}">{escape(text)}</p>' for text in self.notices
+            ),
+            sections="\n".join(
+                f'<section id="{one.name}"><h2>{escape(one.title)}</h2>\n{one.html}\n</section>'
+                for one in self.sections
+            ),
+            footer="\n".join(f"<p>{escape(text)}</p>" for text in self.footer),
+            facts=embedded(self.facts),
+            recording=base64.b64encode(self.recording).decode(),
+            script=script,
+        )
+
+
+def static(name: str) -> str:
+    """Return a text file of the package."""
+    return (files("tisim.report") / "static" / name).read_text(encoding="utf-8")
+
+
+def embedded(data: Any) -> str:
+    """Return data as JSON that can stand in an HTML element: no text in it ends the element."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _hash(text: str) -> str:
+    """Return the hash by which a policy names a script or a style."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], name: str, numbers: Sequence[int] = ()) -> str:
+    """Return a table of text cells as HTML.
+
+    name : of the file as which a reader saves it. numbers : indices of columns of numbers.
+    """
+
+    def cell(k: int, text: str) -> str:
+        if k == 0:
+            return f'<th scope="row">{escape(text)}</th>'
+        return f'<td class="number">{escape(text)}</td>' if k in numbers else f"<td>{escape(text)}</td>"
+
+    titles = "".join(
+        f'<th scope="col"{" class=number" if k in numbers else ""}>{escape(text)}</th>'
+        for k, text in enumerate(head)
+    )
+    body = "\n".join("<tr>" + "".join(cell(k, text) for k, text in enumerate(row)) + "</tr>" for row in rows)
+    return (
+        f'<div class="wide"><table data-csv="{escape(name)}"><thead><tr>{titles}</tr></thead>\n'
+        f"<tbody>{body}</tbody></table></div>"
+    )
+
+
+def picture(title: str, png: bytes) -> str:
+    """Return a PNG with a title as HTML."""
+    data = base64.b64encode(png).decode()
+    return (
+        f"<figure><figcaption>{escape(title)}</figcaption>"
+        f'<img alt="{escape(title)}" src="data:image/png;base64,{data}"></figure>'
+    )
