@@ -134,6 +134,6 @@ def test_tables_and_figure_have_the_means(found):
     assert len(figure.axes) == 7
     assert residuals.lines[0].get_ydata()[-1] < 1e-4
     assert len(kinds.get_yticks()) == len(BLASTS)
-    drawn = energies.containers[1].lines[0].get_ydata()
+    drawn = np.asarray(energies.containers[1].lines[0].get_ydata(), float)
     np.testing.assert_allclose(drawn, [mean(found.by_energy[RELAXED, w], "along").value for w in (1e4, 2e5)])
     assert isinstance(found.balls[RELAXED][0], Ball)

@@ -111,10 +111,14 @@ def test_table_and_figure_have_each_bed():
     assert [float(x) for x in first[2:5]] == pytest.approx([0.0, 0.01, 0.012706], abs=1e-6)
     assert first[-1] == "2"
     figure = bed_figure(found)
-    # The silo, its bottom and the disc are drawn around the grains, beside a scale bar.
-    rims = [line.get_xydata() for line in figure.axes[0].lines if len(line.get_xydata()) > 2]
-    widths = sorted(np.ptp(rim[:, 0]) / DIAMETER for rim in rims)
-    assert widths == pytest.approx([7.0, 12.0, 12.0, 12.0, 16.0], rel=1e-2)
+    # The silo is drawn above the disc, with their diameters.
+    picture = figure.axes[0].images[0]
+    covered = picture.get_array()[..., 3] > 0.5
+    left, right, _, _ = picture.get_extent()
+    unit = (right - left) / covered.shape[1] / DIAMETER
+    silo = np.flatnonzero(covered[covered.shape[0] // 2 + 50 :].any(axis=0))
+    assert (np.ptp(silo) + 1) * unit == pytest.approx(12.0, rel=1e-2)
+    assert covered.sum(axis=1).max() * unit == pytest.approx(16.0, rel=1e-2)
     angles, law = figure.axes[2], figure.axes[5]
     drawn = [np.asarray(axis.containers[0].lines[0].get_ydata(), float) for axis in (angles, law)]
     np.testing.assert_allclose(drawn[0], [one.angle.value for one in found[:4]])
