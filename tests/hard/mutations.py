@@ -164,6 +164,12 @@ SHARED = {
         "0.99 * self.farthest(s, w, i, q, direction)",
         f"{SHAPES}a_brick_comes_to_rest_on_its_largest_face",
     ),
+    "curved_walls": (
+        "tisim/effects/walls/curved_walls.py", "deep = n.dot(place + y) - planes[2]",
+        "deep = n.dot(place + 0.99 * y) - planes[2]",
+        "tests/effects/constraint/test_shapes_in_curved_walls.py::"
+        "test_the_force_of_a_wall_is_the_one_of_the_deepest_point_of_the_surface",
+    ),
     "rods_beside_superquadrics": (
         f"{MOTIONS}/rigid_mixture.py", "RigidRods.corner(self, s, w, i, c,",
         "RigidRods.corner(self, s, w, i, 0 * c,",
