@@ -55,11 +55,11 @@ class _Sum:
 class FieldSampler:
     """The sum of all sources of a quantity among effects at any points, compiled once for many calls.
 
-        with FieldSampler(effects, "flow_velocity") as flow:
-            velocity, gradient = flow(points)
+    It is a context manager: after ``with FieldSampler(effects, "flow_velocity") as flow`` call
+    ``flow(points)`` as often as wanted. At the end of the block the memory of the device is freed.
 
     quantity : its standard name, such as "magnetic_flux_density" (T). InputError is raised if it has no
-    source. The memory of the device is freed at the end of the block.
+    source.
     """
 
     def __init__(self, effects: Sequence[Effect], quantity: str) -> None:

@@ -54,7 +54,10 @@ def meeting(name, dt=1e-6, law=ELASTIC, **more):
     return made
 
 
-@pytest.mark.parametrize("name", ["side of a rod on an ellipsoid", "end of a rod on an ellipsoid"])
+@pytest.mark.parametrize(
+    "name",
+    ["side of a rod on an ellipsoid", pytest.param("end of a rod on an ellipsoid", marks=pytest.mark.slow)],
+)
 def test_a_rod_and_a_superquadric_collide_as_in_a_numpy_reference(name):
     shapes, errors = PAIRS[name][0], []
     effective = USUAL["young"] / (2 * (1 - USUAL["poisson"] ** 2))
@@ -97,6 +100,7 @@ def test_an_elastic_collision_keeps_energy_momentum_and_angular_momentum(name):
     assert max(errors[1:]) < 5e-6
 
 
+@pytest.mark.slow
 def test_friction_keeps_momentum_and_angular_momentum():
     (result,) = simulate([meeting("side of a rod on a brick", law=STICKING)])
     start, end = result.start, result.state
@@ -106,6 +110,7 @@ def test_friction_keeps_momentum_and_angular_momentum():
     assert 0.2 < energy(end) / energy(start) < 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [ROD, BRICK], ids=["rods", "bricks"])
 def test_bodies_of_one_family_collide_as_in_a_scene_of_their_own(shape):
     """With friction, and on a floor; the mixture has a shape of the other family that no body takes."""
@@ -143,6 +148,7 @@ def test_all_bodies_come_to_rest_on_a_floor():
     np.testing.assert_allclose(heights, [D / 2, D, BRICK.semi_axes[1]], rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_a_rod_lies_across_two_fixed_bricks():
     """It stays at rest, with half of its weight on each."""
     upright = Rotation.from_rotvec([np.pi / 2, 0, 0]).as_quat(scalar_first=True)

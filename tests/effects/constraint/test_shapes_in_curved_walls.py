@@ -124,6 +124,7 @@ def expected(kind, shape, turn, centre, outside):
     return force, torque, overlaps
 
 
+@pytest.mark.slow
 def test_the_force_of_a_wall_is_the_one_of_the_deepest_point_of_the_surface(rng):
     """Rods, spheres, ellipsoids and bricks, inside the walls, and outside the sphere and the cylinder."""
     sites = [(kind, out) for kind in ("cylinder", "sphere", "cone") for out in (False, True)][:5]
