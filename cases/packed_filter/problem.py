@@ -3,9 +3,9 @@ and those that divide colloids most sharply by size.
 
 A design is the diameter, the aspect ratio and the solid fraction of the fibres, and the field. In the variant
 "pressure" all designs let the same flow through a matrix of the same depth, and the search finds the front of
-captured fraction and pressure drop. In the variant "select" the speed of the flow
-is a gene as well, and a filter is wanted that captures colloids larger than ``CUT`` and lets smaller ones
-pass: of the captured fractions of both, the difference is maximised.
+captured fraction and pressure drop. In the variant "select" the speed of the flow is a gene as well, and a
+filter is wanted that captures colloids larger than ``CUT`` and lets smaller ones pass: the difference of the
+captured fractions of both is maximised.
 
 The field remains on, and the field and the flow of each design are resolved between its fibres. The matrix is
 one cube of a packing, whose side ``depth`` differs between designs. Captured fraction and pressure drop are

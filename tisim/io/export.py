@@ -164,7 +164,7 @@ def _vtu(arrays: Arrays) -> bytes:
 def _vtu_of_walls(trajectory: Frames, frame: Frame) -> bytes:
     """Return the walls of one frame as an unstructured grid of triangles.
 
-    The cell data are ``wall``, the index of the walls among those of the scene, and ``material``, the index
+    The cell data are ``wall``, the index of the walls in the scene, and ``material``, the index
     of their material.
     """
     scene, bodies = trajectory.scene, _walls(trajectory, frame)

@@ -36,7 +36,8 @@ class Look:
         """Return the look that texts describe; InputError if they are invalid.
 
         view : azimuth and elevation of the viewer in degrees, "-62,18". crop : left, right, bottom and top of
-            a part of the picture, 0..1, "0.2,0.8,0,0.5". clip : what is kept, in m, such as "y<0.01".
+            a part of the picture, 0..1, "0.2,0.8,0,0.5". clip : the part of space
+            that is drawn, in m, such as "y<0.01".
         """
         camera = USUAL_CAMERA
         if view:

@@ -204,7 +204,7 @@ def test_runs_have_the_same_bits_by_any_schedule_in_a_batch_and_restarted(tmp_pa
 
 
 def test_shapes_are_numbered_with_rods_first():
-    """The bounding radii and masses of a start are those of the shapes in this order."""
+    """A start has the bounding radii and masses of the shapes in this order."""
     law = RigidMixture(rods=(ROD, BALL), superquadrics=(EGG, BRICK))
     assert list(law.shapes()) == [ROD, BALL, EGG, BRICK]
     made = moving((ROD, BALL, EGG, BRICK), 0.1 * np.eye(4)[:, :3], shape=np.arange(4))
