@@ -26,7 +26,7 @@ from tisim.report.columns import Column
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence, compress
 from tisim.report.contact_network import ContactNetwork, contact_network, has_contacts
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.page import Page, Section, picture, table
+from tisim.report.page import Page, Section, copied_text, picture, table
 from tisim.report.scenery import colour_maps, scenery
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -119,18 +119,12 @@ def run_page(
     # The function asks for a scene, times and frames alone.
     series = time_series.history(cast(Frames, sequence))
     times, panels = tables.time_series(series, scene, sequence.measures)
-    trajectory, network, notices = _recording(sequence, options, reserved)
+    trajectory, network, notices = recording(sequence, options, reserved)
     state, verdict, sentences = _status(sequence, result)
     first, last = sequence[0].arrays, sequence[-1].arrays
-    lengths = [len(one.data) for one in trajectory.columns]
-    data = b"".join(one.data for one in trajectory.columns)
-    if network is not None:
-        lengths, data = [*lengths, len(network.data())], data + network.data()
+    played, data = player_facts(sequence, trajectory, network)
     facts = {
-        "name": scene.name, "trajectory": trajectory.facts(), "lengths": lengths,
-        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
-        "series": {"times": tables.digits(times), "curves": panels},
-        "maps": colour_maps(), "materials": list(scene.materials),
+        **played, "series": {"times": tables.digits(times), "curves": panels}, "maps": colour_maps(),
     }  # fmt: skip
     ends = len(first["mass"]), len(last["mass"])
     shown = f"{len(trajectory.times)} of {count}" if len(trajectory.times) < count else f"{count}"
@@ -174,7 +168,20 @@ def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list
     return ("ok", "ok", []) if status.ok else ("failed", "failed", [f"The run failed {status.reason}."])
 
 
-def _recording(
+def player_facts(
+    sequence: FrameSequence, trajectory: CompressedTrajectory, network: ContactNetwork | None
+) -> tuple[dict[str, object], bytes]:
+    """Return what a browser needs to play a run: plain data, and the compressed frames."""
+    parts = [one.data for one in trajectory.columns] + ([network.data()] if network is not None else [])
+    facts = {
+        "name": sequence.scene.name, "trajectory": trajectory.facts(), "lengths": [len(one) for one in parts],
+        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
+        "materials": list(sequence.scene.materials),
+    }  # fmt: skip
+    return facts, b"".join(parts)
+
+
+def recording(
     sequence: FrameSequence, options: ReportOptions, reserved: float
 ) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
     """Return the frames that the limit allows, with their contacts, and sentences about those left out."""
@@ -271,7 +278,7 @@ def _asked(scene: Scene) -> str:
         return text + f"<p>As a file, the scene has {size:.3g} MB: scene.toml in the folder of the run.</p>"
     return text + (
         '<details class="block"><summary>The scene as a file, to run again or to change</summary>'
-        f'<pre id="toml" tabindex="0">{escape(toml)}</pre></details>'
+        f"{copied_text('scene.toml', toml)}</details>"
     )
 
 
