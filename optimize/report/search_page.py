@@ -27,8 +27,8 @@ from tisim.version import __version__
 WIDE_RANGE = 100.0
 """Values that are positive and spread over more than this factor are drawn on a logarithmic axis."""
 VIEW = (
-    '<aside id="design" aria-label="Chosen design" aria-live="polite"></aside>'
-    '<a id="shown" href="#design" aria-label="To the chosen design"></a>'
+    '<aside id="chosen" aria-label="Chosen design" aria-live="polite"></aside>'
+    '<a id="shown" href="#chosen" aria-label="To the chosen design"></a>'
 )
 """The places of the panel of the chosen design, and of its short form on narrow pages."""
 
@@ -94,7 +94,7 @@ def search_page(data: SearchData, options: SearchPageOptions, kept: Sequence[int
     scenes = {kept.index(k): toml for k, toml in _scenes(data, options).items() if k in kept}
     facts = {
         "name": data.name, "several": several, "generations": list(data.logbook.get("gen", ())),
-        "convergence": list(convergence(data)), "designs": designs_facts(data, kept),
+        "convergence": list(convergence(data)), "progress": list(progress(data)), "designs": designs_facts(data, kept),
         "quantities": _quantities(data), "maps": colour_maps(), "recordings": recordings,
         "scenes": scenes, "command": shlex.join(["tisim", *data.command]) if data.command else "",
     }  # fmt: skip
@@ -199,55 +199,48 @@ def _best(data: SearchData, kept: Sequence[int], count: int) -> list[int]:
 
 
 def convergence(data: SearchData) -> Iterable[dict[str, Any]]:
-    """Yield the panels of curves by generation: the best and the mean fitness, or the best value of each of
-    several objectives; then the derived values, the starts, the failed designs and the search box."""
+    """Yield the panels of the best values by generation; for one objective also the mean of the population
+    with its standard deviation, and the derived values."""
     log = data.logbook
-    if not log or not log.get("gen"):
+    if not log.get("gen"):
         return
-
-    def numbers(heading: str) -> list[float | None]:
-        return [number_or_none(value) for value in log[heading]]
-
-    def panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
-        every = [value for one in curves for value in one["values"] if value is not None]
-        wide = _spread(every)
-        return {"title": title, "unit": unit, "logarithmic": wide, "curves": curves, "marks": list(marks)}
-
     marks = list(_held_out_best(data))
-    if len(data.objectives) == 1:
-        (objective,) = data.objectives
-        mean, std = log["mean"], log["std"]
-        ends = [(m - s, m + s) for m, s in zip(mean, std, strict=True)]
-        yield panel(
-            f"{objective['name']}: best, and mean and standard deviation of the population",
-            objective.get("unit", ""),
-            [
-                {"label": "best", "values": numbers("best")},
-                {
-                    "label": "mean", "values": numbers("mean"),
-                    "low": [number_or_none(low) for low, _ in ends],
-                    "high": [number_or_none(high) for _, high in ends],
-                },
-            ],
-            marks,
-        )  # fmt: skip
-    unit_of = {row["name"]: row.get("unit", "") for row in data.objectives}
-    own = {"gen", "best", "mean", "std", "recentred"}
+    if len(data.objectives) > 1:
+        for row in data.objectives:
+            for heading in (one for one in log if one.startswith(f"best {row['name']}")):
+                yield _panel(f"best {row['name']}", row.get("unit", ""), [_curve("", log[heading])])
+        return
+    (objective,) = data.objectives
+    ends = [(m - s, m + s) for m, s in zip(log["mean"], log["std"], strict=True)]
+    mean = _curve("mean", log["mean"])
+    mean["low"], mean["high"] = ([number_or_none(end) for end in side] for side in zip(*ends, strict=True))
+    title = f"{objective['name']}: best, and mean and standard deviation of the population"
+    yield _panel(title, objective.get("unit", ""), [_curve("best", log["best"]), mean], marks)
+
+
+def progress(data: SearchData) -> Iterable[dict[str, Any]]:
+    """Yield the panels of all other numbers of a generation that change."""
     titles = {
-        "starts": "new runs of a generation", "designs": "new designs of a generation",
-        "failed": "failed designs of a generation", "box": "mean width of the search box",
-        "front": "designs in the front",
+        "starts": "new runs", "designs": "new designs", "failed": "failed designs",
+        "box": "mean width of the search box", "front": "designs in the front",
     }  # fmt: skip
-    for heading, values in log.items():
-        if heading in own or not all(isinstance(value, int | float) for value in values):
+    for heading, values in data.logbook.items():
+        known = heading in ("gen", "mean", "std", "recentred") or heading.split(" ")[0] == "best"
+        if known or not all(isinstance(value, int | float) for value in values):
             continue
-        known = {value for value in values if math.isfinite(value)}
-        name = next((one for one in unit_of if heading.startswith(f"best {one}")), None)
-        if name is not None:
-            mine = [mark for mark in marks if mark["name"] == name]
-            yield panel(heading, unit_of[name], [{"label": "", "values": numbers(heading)}], mine)
-        elif len(known) > 1:
-            yield panel(titles.get(heading, heading), "", [{"label": "", "values": numbers(heading)}])
+        if len({value for value in values if math.isfinite(value)}) > 1:
+            yield _panel(titles.get(heading, heading), "", [_curve("", values)])
+
+
+def _curve(label: str, values: Sequence[float]) -> dict[str, Any]:
+    return {"label": label, "values": [number_or_none(value) for value in values]}
+
+
+def _panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
+    every = [value for one in curves for value in one["values"] if value is not None]
+    return {
+        "title": title, "unit": unit, "logarithmic": _spread(every), "curves": curves, "marks": list(marks)
+    }  # fmt: skip
 
 
 def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
@@ -262,7 +255,7 @@ def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
         if value is not None:
             label = "best from fresh starts, 95 % interval"
             last = data.logbook["gen"][-1]
-            yield {"name": name, "x": last + 0.5, "value": value, "low": low, "high": high, "label": label}
+            yield {"x": last + 0.5, "value": value, "low": low, "high": high, "label": label}
 
 
 def _scenes(data: SearchData, options: SearchPageOptions) -> dict[int, str]:
@@ -317,7 +310,12 @@ def _versions(data: SearchData) -> str:
 def _sections(data: SearchData, clouds: bool, several: bool) -> Iterable[Section]:
     if clouds:
         yield Section("clouds", "Start and end", '<div id="views"></div>')
-    yield Section("convergence-section", "Convergence", '<div id="convergence" class="figures"></div>')
+    yield Section(
+        "reached",
+        "Convergence",
+        '<div id="convergence" class="figures"></div><details class="block"><summary>Further numbers of each '
+        'generation</summary><div id="progress" class="figures"></div></details>',
+    )
     if several:
         yield Section("front", "Front", '<div id="fronts" class="figures"></div>')
     yield Section(

@@ -17,7 +17,7 @@ from tests.report.conftest import scene
 from tisim import InputError, Material
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
-from tisim.cli.inspect import report
+from tisim.cli.report import report
 from tisim.effects import Granular, Gravity, Walls
 from tisim.geometry import Plane
 from tisim.io.reader import frames
