@@ -178,6 +178,13 @@ class Plot {
       element("div", { class: "layers" }, this.canvas, this.above), this.readout);
     place.append(this.figure);
     new ResizeObserver(() => this.resize()).observe(this.canvas.parentNode);
+    // A figure that is out of sight is drawn when it comes into view.
+    this.seen = true;
+    this.stale = null;
+    new IntersectionObserver(([entry]) => {
+      this.seen = entry.isIntersecting;
+      if (this.seen && this.stale) this[this.stale]();
+    }, { rootMargin: "200px" }).observe(this.canvas);
   }
 
   resize() {
@@ -194,7 +201,8 @@ class Plot {
   }
 
   pen(canvas) {
-    const context = canvas.getContext("2d");
+    // Thousands of small shapes are faster in memory than sent to a graphics card, or to what stands for one.
+    const context = canvas.getContext("2d", { willReadFrequently: true });
     context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     context.globalAlpha = 1;
     context.clearRect(0, 0, this.wide, this.high);
@@ -203,19 +211,25 @@ class Plot {
 
   paint() {
     if (!this.wide) return;
+    this.stale = null;
     this.draw(this.pen(this.canvas), inks());
     this.point();
   }
 
   /** Draws again before the next picture of the browser, once however often it is asked. */
   repaint() {
-    if (this.asked) return;
+    if (!this.seen) this.stale = "paint";
+    if (this.asked || !this.seen) return;
     this.asked = true;
     requestAnimationFrame(() => { this.asked = false; this.paint(); });
   }
 
   point() {
-    if (this.wide) this.drawAbove(this.pen(this.above), inks());
+    if (!this.seen) this.stale ??= "point";
+    else if (this.wide) {
+      if (this.stale === "point") this.stale = null;
+      this.drawAbove(this.pen(this.above), inks());
+    }
   }
 
   name() {

@@ -129,6 +129,7 @@ class Clouds {
     } catch (error) {
       return this.place.replaceChildren(element("p", { class: "warning", role: "alert" }, `The particles cannot be shown: ${error.message}`));
     }
+    right.querySelector("details").open = false;
     this.player.theme(document.documentElement.dataset.theme === "dark");
     this.player.viewer.listeners.push(() => this.follow());
     this.player.go(trajectory.frames - 1);
@@ -393,9 +394,11 @@ class SearchPage {
       designs.included[k] = this.parallel.within(k);
       if (designs.included[k]) inside.push(k);
     }
-    this.table.filter(inside.length < designs.count ? inside : null);
+    // The table follows when the pointer rests.
+    clearTimeout(this.filtering);
+    this.filtering = setTimeout(() => this.table.filter(inside.length < designs.count ? inside : null), 80);
     this.tell();
-    for (const plot of [...this.plots, ...this.pairPlots]) plot.repaint();
+    for (const plot of [...this.plots, ...this.pairPlots, this.parallel]) plot.repaint();
   }
 
   tell() {
