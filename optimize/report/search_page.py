@@ -19,14 +19,13 @@ from tisim.files.atomic import replace_file
 from tisim.optimize.report.recorded_designs import RecordedDesign
 from tisim.optimize.report.search_data import Row, RunOfDesign, SearchData, number_or_none, read_search
 from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW, error_of
+from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.page import SEARCH_SCRIPTS, Page, Section, copied_text, table
 from tisim.report.run_report import SIZE_LIMIT
 from tisim.report.scenery import colour_maps
 from tisim.version import __version__
 
-WIDE_RANGE = 100.0
-"""Values that are positive and spread over more than this factor are drawn on a logarithmic axis."""
-VIEW = (
+CHOSEN_DESIGN = (
     '<aside id="chosen" aria-label="Chosen design" aria-live="polite"></aside>'
     '<a id="shown" href="#chosen" aria-label="To the chosen design"></a>'
 )
@@ -94,15 +93,14 @@ def search_page(data: SearchData, options: SearchPageOptions, kept: Sequence[int
     scenes = {kept.index(k): toml for k, toml in _scenes(data, options).items() if k in kept}
     facts = {
         "name": data.name, "several": several, "generations": list(data.logbook.get("gen", ())),
-        "convergence": list(convergence(data)), "progress": list(progress(data)), "designs": designs_facts(data, kept),
-        "quantities": _quantities(data), "maps": colour_maps(), "recordings": recordings,
-        "scenes": scenes, "command": shlex.join(["tisim", *data.command]) if data.command else "",
+        "convergence": list(convergence(data)), "progress": list(progress(data)),
+        "designs": designs_facts(data, kept), "quantities": _quantities(data), "maps": colour_maps(),
+        "recordings": recordings, "scenes": scenes, "command": _command(data),
     }  # fmt: skip
     notices = list(_notices(data))
     if len(kept) < len(data):
-        notices.append(
-            f"To keep this file below {options.limit:g} MB, it has the best {len(kept)} of {len(data)} designs."
-        )
+        some = f"the best {len(kept)} of {len(data)} designs"
+        notices.append(f"To keep this file below {options.limit:g} MB, it has {some}.")
     ended = {"": "not ended", "interrupted": "interrupted", "target": "target reached"}
     return Page(
         title=data.title,
@@ -115,7 +113,7 @@ def search_page(data: SearchData, options: SearchPageOptions, kept: Sequence[int
         sections=list(_sections(data, bool(recordings), several)),
         footer=[f"Search {data.name}. {_versions(data)} Written by tisim {__version__}."],
         scripts=SEARCH_SCRIPTS,
-        view=VIEW,
+        view=CHOSEN_DESIGN,
     )
 
 
@@ -137,7 +135,7 @@ def designs_facts(data: SearchData, kept: Sequence[int]) -> dict[str, Any]:
         columns["errors"] = columns["errors"] or [None for _ in kept]
         return {
             "name": name, "unit": row.get("unit", ""), "largest": row.get("direction") == "largest",
-            "logarithmic": _spread(known), "values": [number_or_none(value) for value in of(known)], **columns,
+            "logarithmic": _spread(known), "values": list(map(number_or_none, of(known))), **columns,
         }  # fmt: skip
 
     fresh, quantities = data.facts.get(f"starts{FRESH_STARTS}", ()), _quantities(data)
@@ -187,7 +185,7 @@ def _spread(values: Sequence[float]) -> bool:
 
 
 def _best(data: SearchData, kept: Sequence[int], count: int) -> list[int]:
-    """Return the best of designs: those of the hall of fame, and those with the best value of an objective."""
+    """Return the best of designs: the hall of fame, and designs with the best values of an objective."""
     order = {k: (0 if data.facts["rank"][k] else 1, math.inf) for k in kept}
     for row in data.objectives:
         sign = -1.0 if row.get("direction") == "largest" else 1.0
@@ -251,7 +249,9 @@ def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
     for row in data.objectives:
         name = row["name"]
         heads = (f"{name}{FRESH_STARTS}", f"{name} {LOW}{FRESH_STARTS}", f"{name} {HIGH}{FRESH_STARTS}")
-        value, low, high = (number_or_none(data.values[head][best]) if head in data.values else None for head in heads)
+        value, low, high = (
+            number_or_none(data.values[head][best]) if head in data.values else None for head in heads
+        )
         if value is not None:
             label = "best from fresh starts, 95 % interval"
             last = data.logbook["gen"][-1]
@@ -287,10 +287,14 @@ def _summary(data: SearchData) -> str:
     seconds = sum(run.wall_s for of_it in data.runs for run in of_it)
     designs = f"{len(data):,}" + (f", {failed:,} of them failed" if failed else "")
     last = (data.logbook.get("gen") or [0])[-1]
-    return (
-        f"Designs: {designs}. Runs: {runs:,}, {_duration(seconds)} of wall time. Generations: {last} after the "
-        f"first. Method: {data.settings.get('method')}, seed {data.settings.get('seed')}."
-    )
+    method = f"Method: {data.settings.get('method')}, seed {data.settings.get('seed')}."
+    work = f"Runs: {runs:,}, {_duration(seconds)} of wall time. Generations: {last} after the first."
+    return f"Designs: {designs}. {work} {method}"
+
+
+def _command(data: SearchData) -> str:
+    """Return the command that began a search; "" if it was begun in Python."""
+    return shlex.join(["tisim", *data.command]) if data.command else ""
 
 
 def _duration(seconds: float) -> str:
@@ -303,8 +307,8 @@ def _duration(seconds: float) -> str:
 
 def _versions(data: SearchData) -> str:
     evaluator = data.identity.get("evaluator", {})
-    told = [f"{name} {value}" for name, value in evaluator.items()]
-    return f"Run by tisim {data.versions.get('tisim', 'of another version')}{', ' if told else ''}{', '.join(told)}."
+    told = [f"tisim {data.versions.get('tisim')}", *(f"{name} {value}" for name, value in evaluator.items())]
+    return f"Run by {', '.join(told)}."
 
 
 def _sections(data: SearchData, clouds: bool, several: bool) -> Iterable[Section]:
@@ -344,7 +348,9 @@ def _asked(data: SearchData) -> str:
         return ", ".join(f"{word} {row[name]:.6g}" for name, word in words.items() if name in row)
 
     text = "<h3>Genes</h3>" + table(
-        ("gene", "unit", "range"), [(row["name"], row.get("unit", ""), bounds(row)) for row in data.genes], "genes"
+        ("gene", "unit", "range"),
+        [(row["name"], row.get("unit", ""), bounds(row)) for row in data.genes],
+        "genes",
     )
     text += "<h3>Objectives</h3>" + table(
         ("objective", "unit", "wanted", "over the starts", "meaning"),
@@ -364,7 +370,7 @@ def _asked(data: SearchData) -> str:
         ("setting", "value"), [(name, str(value)) for name, value in _leaves(data.settings)], "settings"
     )
     if data.command:
-        text += "<h3>Command</h3>" + copied_text("command", shlex.join(["tisim", *data.command]) + "\n")
+        text += "<h3>Command</h3>" + copied_text("command.txt", f"{_command(data)}\n")
     return text
 
 

@@ -24,7 +24,7 @@ from tisim.cli.options import (
     nameable,
 )
 from tisim.console import err, progress_bar
-from tisim.errors import InputError, must
+from tisim.errors import InputError
 from tisim.files import output_folder, pictures, regular_file
 from tisim.files.output_folder import resumes
 from tisim.streams import say

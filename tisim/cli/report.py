@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     from tisim.optimize.problem.problem import Problem
     from tisim.optimize.report.search_data import SearchData
 
-RUN, SEARCH, STUDY = "a run", "a search", "a study of costs"
-FILE_OF = {"search.h5": SEARCH, "cost.h5": STUDY}
-"""Kinds of pages other than ``RUN``, by the file from which they are made."""
+RUN_PAGE, SEARCH_PAGE, COST_PAGE = "a run", "a search", "a study of costs"
+"""Kinds of pages."""
+PAGE_OF = {"search.h5": SEARCH_PAGE, "cost.h5": COST_PAGE}
+"""Kinds of pages that are not of a run, by the file from which they are made."""
 OPTIONS_OF = {
-    RUN: {"world": "--world", "fields": "--field", "contacts": "--contacts", "checks": "--checks"},
-    SEARCH: {"search": "--search", "designs": "--designs", "problem": "--problem"},
+    RUN_PAGE: {"world": "--world", "fields": "--field", "contacts": "--contacts", "checks": "--checks"},
+    SEARCH_PAGE: {"search": "--search", "designs": "--designs", "problem": "--problem"},
 }
 """The options of ``tisim report`` that are for one kind of page alone, by the names of its parameters."""
 
@@ -54,13 +55,14 @@ def report(
     ] = None,
     limit: Annotated[
         float,
-        typer.Option(metavar="MB", help="Largest size of the file; frames or designs are left out to keep it."),
+        typer.Option(metavar="MB", help="Largest size of the file; frames or designs are left out."),
     ] = 15.0,
     world: World = 0,
     fields: Annotated[
         list[str] | None,
         typer.Option(
-            "--field", metavar="NAME",
+            "--field",
+            metavar="NAME",
             help="Of a run: a quantity of particles for colours; all by default. Repeatable.",
         ),
     ] = None,
@@ -79,12 +81,14 @@ def report(
     search: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Of several searches in a folder: its name; the one that ended last by default."
+            metavar="NAME", help="Of several searches in a folder: the name; by default the last that ended."
         ),
     ] = None,
     designs: Annotated[
         int,
-        typer.Option(min=0, max=100, help="Of a search: run its best designs, this number, to show their clouds."),
+        typer.Option(
+            min=0, max=100, help="Of a search: run this number of its best designs, to show their clouds."
+        ),
     ] = 0,
     problem: Annotated[
         str | None,
@@ -95,13 +99,13 @@ def report(
     ] = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write a page that shows a run, a search or a study of costs.
 
     It is one HTML file, to open in a browser without a network. The page of a run shows the particles in
-    three dimensions and in motion, the scene, time series and balances, and the pictures of the case. The page
-    of a search shows its convergence, its front and all its designs; the page of a study shows errors against
-    times.
+    three dimensions and in motion, the scene, time series and balances, and the pictures of the case. The
+    page of a search shows its convergence, its front and all its designs; the page of a study shows errors
+    against times.
     """
     kind, source = _kind(file)
     given = given_options(context)
@@ -110,9 +114,9 @@ def report(
         must(not wrong, "options", f"for {kind}, as {file} is one", ", ".join(wrong))
     path = to or source.parent / "report.html"
     must(path.suffix in (".html", ".htm"), "--to", "a file NAME.html", str(path))
-    if kind == RUN:
+    if kind == RUN_PAGE:
         _run(source, path, world, fields, limit, contacts, checks, overwrite)
-    elif kind == SEARCH:
+    elif kind == SEARCH_PAGE:
         _search(source, path, search, designs, problem, limit, overwrite)
     else:
         _study(source, path, limit, overwrite)
@@ -121,14 +125,15 @@ def report(
 
 def _kind(path: Path) -> tuple[str, Path]:
     """Return the kind of a page, and the file from which it is made. InputError if a folder has none."""
-    if path.name in FILE_OF:
-        return FILE_OF[path.name], path
-    if regular_file.is_folder(path):
-        run = any(regular_file.exists(path / name) for name in ("trajectory.h5", "result.h5"))
-        for name, kind in FILE_OF.items():
-            if not run and any(regular_file.exists(path / one) for one in (name, f"{name}.journal")):
+    if not regular_file.is_folder(path):
+        return PAGE_OF.get(path.name, RUN_PAGE), path
+    run = ("trajectory.h5", "result.h5", "checkpoint.h5")
+    if not any(regular_file.exists(path / name) for name in run):
+        for name, kind in PAGE_OF.items():
+            if any(regular_file.exists(path / one) for one in (name, f"{name}.journal")):
                 return kind, path / name
-    return RUN, trajectory_file(path)
+        raise InputError(f"folder must be one of a run, a search or 'tisim cost'; received {str(path)!r}")
+    return RUN_PAGE, trajectory_file(path)
 
 
 def _run(
@@ -211,5 +216,6 @@ def _problem(data: SearchData, needed: bool, target: str | None) -> Problem | No
     except InputError as error:
         if needed:
             raise
-        say(f"the page has no scenes, as the problem of '{shlex.join(['tisim', *words])}' is not found: {error}")
+        command = shlex.join(["tisim", *words])
+        say(f"the page has no scenes, as the problem of '{command}' is not found: {error}")
         return None

@@ -18,12 +18,12 @@ from tisim.report.page import COST_SCRIPTS, Page, Section, copied_text, table
 from tisim.report.run_report import SIZE_LIMIT
 from tisim.version import __version__
 
-VIEW = (
+CHOSEN_SETTING = (
     '<aside id="chosen" aria-label="Chosen setting" aria-live="polite"></aside>'
     '<a id="shown" href="#chosen" aria-label="To the chosen setting"></a>'
 )
 """The places of the panel of the chosen setting, and of its short form on narrow pages."""
-MARKS = (
+MARK_MEANINGS = (
     "hollow: upper bound of an error",
     "dark ring: cheapest for a power of ten of the error",
     "broken line: another precision or arithmetic",
@@ -70,7 +70,7 @@ def cost_page(study: StoredStudy) -> Page:
         sections=list(_sections(study)),
         footer=[f"Measured by tisim {study.versions.get('tisim')}. Written by tisim {__version__}."],
         scripts=COST_SCRIPTS,
-        view=VIEW,
+        view=CHOSEN_SETTING,
     )
 
 
@@ -80,8 +80,8 @@ def _facts(study: StoredStudy) -> dict[str, Any]:
         {
             "method": row.method, "setting": row.setting, "python": row.python, "options": row.options,
             "precision": row.precision, "arithmetic": row.arithmetic, "failed": row.failed, "same": row.same,
-            "starts": row.starts, "time": _finite(row.median), "least": _finite(min(row.seconds, default=math.nan)),
-            "most": _finite(max(row.seconds, default=math.nan)), "repeats": len(row.seconds),
+            "starts": row.starts, "time": _finite(row.median), "repeats": len(row.seconds),
+            "least": min(row.seconds, default=None), "most": max(row.seconds, default=None),
             "steps": _finite(row.steps), "sums": _finite(row.sums), "rejections": _finite(row.rejections),
             "errors": [
                 {
@@ -122,7 +122,7 @@ def _notices(study: StoredStudy) -> Iterable[str]:
 
 
 def _sections(study: StoredStudy) -> Iterable[Section]:
-    words = "".join(f"<li>{escape(text)}</li>" for text in (*HEADINGS, *MARKS))
+    words = "".join(f"<li>{escape(text)}</li>" for text in (*HEADINGS, *MARK_MEANINGS))
     yield Section(
         "work",
         "Error and time",
