@@ -1,6 +1,7 @@
 /* Parallel coordinates: an axis for each quantity, a line for each design; parts of axes are chosen by drawing. */
 
 const TOP = 42, BOTTOM = 26, GRAB = 18, FAINT = 0.1;
+const ROUGH_LINES = 400;        // lines that are drawn while a part is being chosen
 
 class Parallel extends Plot {
   /** axes : for each quantity the facts of its axis and values, number (its column). model :
@@ -58,6 +59,10 @@ class Parallel extends Plot {
   brush(at, part) {
     const one = this.axes[at];
     one.brush = part;
+    // A part of the lines is drawn until the choice rests for a moment.
+    this.rough = true;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => { this.rough = false; this.repaint(); }, 150);
     if (one.inputs) one.inputs.forEach((input, end) => { input.value = part ? number(part[end], 4) : ""; });
     else one.boxes.forEach((box, k) => { box.firstChild.checked = !part || part.includes(k); });
     this.model.brushed();
@@ -92,7 +97,8 @@ class Parallel extends Plot {
     this.order ??= [...this.axes[0].values.keys()].sort((a, b) => this.model.order(a) - this.model.order(b));
     this.drawOthers(pen, colours);
     const some = this.order.filter((k) => this.model.included(k)), alpha = Math.max(0.25, Math.min(0.9, 150 / some.length));
-    for (const k of some) pen.line(this.places(k), { stroke: this.model.colour(k), width: 1.2, alpha });
+    const step = this.rough ? Math.ceil(some.length / ROUGH_LINES) : 1;
+    for (const k of some.filter((_, m) => m % step === 0)) pen.line(this.places(k), { stroke: this.model.colour(k), width: 1.2, alpha });
     this.axes.forEach(({ axis, brush }, at) => {
       const x = this.x[at], { label, ticks } = axis.ticks(5), end = at === 0 ? "start" : at === this.axes.length - 1 ? "end" : "middle";
       pen.line([[x, TOP], [x, this.high - BOTTOM]], { stroke: colours.ink, width: 1.2 });
@@ -208,6 +214,11 @@ class Parallel extends Plot {
 
   tell(number, all) {
     this.told.textContent = number === all ? `${all} designs` : `${number} of ${all} designs within the chosen parts`;
+  }
+
+  whole(pen) {
+    this.rough = false;
+    super.whole(pen);
   }
 
   rows() {

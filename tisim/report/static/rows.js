@@ -1,6 +1,6 @@
 /* A table of thousands of rows: sorted by any column, one page of it in the document at a time. */
 
-const PAGE_ROWS = 50;
+const PAGE_ROWS = 25;
 
 class RowTable {
   /** columns : head, number (whether its cells are), value(k) for sorting and files, text(k) for cells.
