@@ -274,7 +274,7 @@ class SearchPage {
     this.pairChoice(id("pair-choice"));
     this.pairs(id("pairs"));
     this.table = new RowTable(id("rows"), designs.count, designColumns(designs, facts),
-      { file: `${this.file}_designs`, label: "designs", chosen: () => designs.chosen, choose: (k) => designs.choose(k) });
+      { file: `${this.file}_designs`, label: "designs", by: 1, chosen: () => designs.chosen, choose: (k) => designs.choose(k) });
     const panel = new Panel(id("chosen"), facts, designs, this.table);
     this.clouds = facts.recordings.length ? new Clouds(id("views"), facts, bytes) : null;
     const bar = id("shown");
