@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.report.conftest import scene
+from tests.report.interactions import processor_times
 from tests.report.searches import HOSTILE, HOSTILE_NAME, made_up, searched
 from tests.report.test_in_browser import FOCUSED, drifting, until
 from tisim.io.reader import frames
@@ -17,8 +18,9 @@ from tisim.report.kept_frames import KeptFrames
 from tisim.report.run_report import ReportOptions, player_facts, recording
 
 pytestmark = pytest.mark.long
-CPU_LIMITS = {"choose": 150.0, "hover": 60.0, "brush": 300.0, "sort": 100.0}
-"""Largest processor time (ms) of the page until an interaction with 2000 designs is shown, a median."""
+CPU_LIMITS = {"choose": 150.0, "hover": 60.0, "brush": 400.0, "sort": 100.0}
+"""Largest processor time (ms) of the page until an interaction with 2000 designs is shown, a median; three
+times the one on an AMD EPYC (Zen 5) or more."""
 
 
 @pytest.fixture(scope="module")
@@ -326,37 +328,5 @@ def test_the_clouds_of_a_recorded_design_play(record, rng, opened, tmp_path):
 def test_two_thousand_designs_are_fluid(many, opened):
     _, path = many
     with opened(path, 1400, 900) as page:
-        page.evaluate("report.page.parallel.above.scrollIntoView({ block: 'start', behavior: 'instant' })")
-        page.wait_for_timeout(500)
-        devtools = page.context.new_cdp_session(page)
-        devtools.send("Performance.setTimeDomain", {"timeDomain": "threadTicks"})
-        devtools.send("Performance.enable")
-
-        def spent(call):
-            """Median processor time of the page until the call is shown, ms."""
-            times = []
-            for k in range(7):
-                page.wait_for_timeout(400)
-                before = devtools.send("Performance.getMetrics")["metrics"]
-                page.evaluate(
-                    f"(async (k) => {{ {call}; for (let m = 0; m < 2; m++)"
-                    " await new Promise((done) => requestAnimationFrame(() => setTimeout(done))); })"
-                    f"({k})"
-                )
-                after = devtools.send("Performance.getMetrics")["metrics"]
-                used = [
-                    next(one["value"] for one in metrics if one["name"] == "TaskDuration")
-                    for metrics in (before, after)
-                ]
-                times.append(1000 * (used[1] - used[0]))
-            return float(np.median(times))
-
-        measured = {
-            "choose": spent("report.page.designs.choose(37 * k + 11)"),
-            "hover": spent("report.page.pairPlots[0].hover(31 * k + 5)"),
-            "brush": spent("report.page.parallel.brush(0, [0.1, 0.5 + 0.05 * k])"),
-            "sort": spent("report.page.table.sort(2 + k % 3)"),
-        }
-        print(measured)
-    slow = {name: time for name, time in measured.items() if time > CPU_LIMITS[name]}
-    assert slow == {}, measured
+        measured = processor_times(page)
+    assert {name: time for name, time in measured.items() if time > CPU_LIMITS[name]} == {}, measured

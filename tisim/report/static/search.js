@@ -394,11 +394,14 @@ class SearchPage {
       designs.included[k] = this.parallel.within(k);
       if (designs.included[k]) inside.push(k);
     }
-    // The table follows when the pointer rests.
-    clearTimeout(this.filtering);
-    this.filtering = setTimeout(() => this.table.filter(inside.length < designs.count ? inside : null), 80);
     this.tell();
-    for (const plot of [...this.plots, ...this.pairPlots, this.parallel]) plot.repaint();
+    this.parallel.repaint();
+    // The table and the other plots follow when the pointer rests.
+    clearTimeout(this.following);
+    this.following = setTimeout(() => {
+      this.table.filter(inside.length < designs.count ? inside : null);
+      for (const plot of [...this.plots, ...this.pairPlots]) plot.repaint();
+    }, 100);
   }
 
   tell() {
