@@ -33,12 +33,12 @@ MOST_DESIGNS = 16
 """Largest number of designs of a front that are run again; of more, those spread over it are."""
 MARGIN = 0.1
 """Distance of the reference point from the worst values, over the range of each objective."""
-NOTE = (
+HYPERVOLUME_NOTE = (
     "hypervolume: part of the box around all fronts, and a tenth beyond their worst values, that a front "
     "dominates; median, lowest, highest: of the searches, from held-out (fresh) starts; claimed: median by "
     "the searches' own estimates"
 )
-NOTE_ON_CONSTRAINTS = "violated: designs whose mean violates a constraint, which do not count"
+VIOLATIONS_NOTE = "violated: designs whose mean violates a constraint, which do not count"
 Points = NDArray[np.float64]
 
 
@@ -129,9 +129,9 @@ def table(problem: Problem, results: Sequence[FrontResult]) -> Table:
     )
     names = ", ".join(objective.label for objective in problem.objectives)
     grid.title, grid.title_justify = f"hypervolume of {names}", "left"
-    grid.caption, grid.caption_justify = NOTE, "left"
+    grid.caption, grid.caption_justify = HYPERVOLUME_NOTE, "left"
     if verdicts:
-        grid.caption = f"{NOTE}; {NOTE_ON_CONSTRAINTS}"
+        grid.caption = f"{HYPERVOLUME_NOTE}; {VIOLATIONS_NOTE}"
     volumes = np.array(hypervolumes(results))
     rows: dict[str, list[int]] = {}
     for k, one in enumerate(results):
