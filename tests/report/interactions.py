@@ -33,7 +33,7 @@ def processor_times(page, pause=500):
             page.wait_for_timeout(pause)
             before = used()
             page.evaluate(
-                f"(async (k) => {{ {call}; for (let m = 0; m < 2; m++)"
+                f"(async (k) => {{ {call};"
                 f" await new Promise((done) => requestAnimationFrame(() => setTimeout(done))); }})({k})"
             )
             times.append(used() - before)

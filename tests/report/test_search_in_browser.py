@@ -96,6 +96,22 @@ def test_a_click_on_a_design_shows_it_everywhere(found, opened):
         assert shown(page) == order[order.index(before) + 1]
 
 
+def test_the_nearest_of_many_designs_is_chosen(many, opened):
+    _, path = many
+    crowded = (
+        "(() => { const plot = report.page.plots[0], at = [...plot.model.x.keys()].map((k) => plot.at(k));"
+        " const near = (a, r) => at.filter((b) => Math.hypot(a[0] - b[0], a[1] - b[1]) < r).length;"
+        " const alone = (k) => near(at[k], 2.5) === 1 && near(at[k], 10) > 3;"
+        " return [...at.keys()].filter(alone).slice(0, 5); })()"
+    )
+    with opened(path, 1400, 900) as page:
+        chosen = page.evaluate(crowded)
+        assert len(chosen) == 5
+        for k in chosen:
+            click(page, "report.page.plots[0]", k)
+            assert page.evaluate("report.page.designs.chosen") == k
+
+
 def test_a_failed_design_says_why(tmp_path, opened):
     searched(tmp_path, "gain")
     data = read_search(tmp_path)
