@@ -26,10 +26,10 @@ from tisim.report.scenery import colour_maps
 from tisim.version import __version__
 
 CHOSEN_DESIGN = (
-    '<aside id="chosen" aria-label="Chosen design" aria-live="polite"></aside>'
+    '<aside id="chosen" aria-label="Chosen design"></aside><p id="told" class="unseen" role="status"></p>'
     '<a id="shown" href="#chosen" aria-label="To the chosen design"></a>'
 )
-"""The places of the panel of the chosen design, and of its short form on narrow pages."""
+"""The places of the panel of the chosen design, and of its short form: for screen readers, and on narrow pages."""
 
 
 @dataclass(frozen=True)
@@ -204,9 +204,9 @@ def convergence(data: SearchData) -> Iterable[dict[str, Any]]:
         return
     marks = list(_held_out_best(data))
     if len(data.objectives) > 1:
-        for row in data.objectives:
-            for heading in (one for one in log if one.startswith(f"best {row['name']}")):
-                yield _panel(f"best {row['name']}", row.get("unit", ""), [_curve("", log[heading])])
+        headings = [one for one in log if one.startswith("best ")]
+        for row, heading in zip(data.objectives, headings, strict=False):
+            yield _panel(f"best {row['name']}", row.get("unit", ""), [_curve("", log[heading])])
         return
     (objective,) = data.objectives
     ends = [(m - s, m + s) for m, s in zip(log["mean"], log["std"], strict=True)]

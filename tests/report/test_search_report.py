@@ -13,10 +13,12 @@ from tests.report.searches import GENES, HOSTILE, HOSTILE_CHOICE, HOSTILE_NAME, 
 from tests.report.test_run_report import facts_of
 from tisim import InputError, Scene, optimize, run
 from tisim.cli.search import problem_of
-from tisim.optimize import Gene, Objective, Problem, Quantile
+from tisim.optimize import Choice, Gene, Objective, Problem, Quantile, Settings
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.report.recorded_designs import best_designs, check_problem, record
 from tisim.optimize.report.search_data import read_search, search_names
 from tisim.optimize.report.search_page import SearchPageOptions, search_html, search_report
+from tisim.optimize.search import search
 from tisim.optimize.storage.cache import Cache
 
 
@@ -131,6 +133,36 @@ def test_designs_with_starts_of_their_own_have_their_runs(tmp_path):
     good = [k for k, reason in enumerate(data.facts["failed"]) if not reason]
     assert [len(data.runs[k]) for k in good] == [data.facts["starts"][k] for k in good]
     assert sum(map(len, data.runs)) == outcome.evaluations
+
+
+def test_choices_of_numbers_and_texts_come_back(tmp_path):
+    """A column of both is stored as text."""
+    genes = [Choice("kind", ("auto", 3, 4.5)), Gene("x", "", 0.0, 1.0), Choice("wet", (True, False))]
+    names = ("best", "best of all")
+    asked = Problem.of_function(
+        lambda design, seed: [design["x"] + seed % 7, design["x"]], genes, names, name="mixed", code="1"
+    )
+    settings = Settings(
+        method="nsga2",
+        generations=1,
+        options={"population": 8},
+        ensemble={"common_starts": False, "confirm": 0},
+    )
+    with Cache(tmp_path / "search.h5") as cache:
+        outcome = search(asked, FunctionEvaluator(), cache, settings)
+    data = read_search(tmp_path)
+    decoded = [asked.genome.decode(point) for point in outcome.generations]
+    for k, design in enumerate(decoded):
+        assert data.design(k) == design
+        assert [type(value) for value in data.design(k).values()] == [
+            type(value) for value in design.values()
+        ]
+        assert len(data.runs[k]) == data.facts["starts"][k]
+    facts, _, _ = page_of(data)
+    assert [panel["title"] for panel in facts["convergence"]] == ["best best", "best best of all"]
+    assert facts["convergence"][1]["curves"][0]["values"] == pytest.approx(
+        outcome.logbook.select("best best of all"), rel=1e-6
+    )
 
 
 def test_a_statistic_is_as_the_search_has_it(tmp_path):
