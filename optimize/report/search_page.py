@@ -21,7 +21,7 @@ from tisim.optimize.report.search_data import Row, RunOfDesign, SearchData, numb
 from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW, error_of
 from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.page import SEARCH_SCRIPTS, Page, Section, copied_text, table
-from tisim.report.run_report import SIZE_LIMIT
+from tisim.report.run_report import LONGEST_TOML, SIZE_LIMIT
 from tisim.report.scenery import colour_maps
 from tisim.version import __version__
 
@@ -29,7 +29,8 @@ CHOSEN_DESIGN = (
     '<aside id="chosen" aria-label="Chosen design"></aside><p id="told" class="unseen" role="status"></p>'
     '<a id="shown" href="#chosen" aria-label="To the chosen design"></a>'
 )
-"""The places of the panel of the chosen design, and of its short form: for screen readers, and on narrow pages."""
+"""The places of the panel of the chosen design, and of its short form: for screen readers, and on narrow
+pages."""
 
 
 @dataclass(frozen=True)
@@ -259,12 +260,12 @@ def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
 
 
 def _scenes(data: SearchData, options: SearchPageOptions) -> dict[int, str]:
-    """Return the scenes of designs as TOML, by index."""
+    """Return the scenes of designs as TOML, by index, except long ones."""
     scenes = dict(options.scenes or {})
     best = next((k for k, one in enumerate(data.facts.get("best", ())) if one), None)
     if data.best_scene and best is not None:
         scenes.setdefault(best, data.best_scene)
-    return scenes
+    return {k: toml for k, toml in scenes.items() if len(toml) <= LONGEST_TOML}
 
 
 def _notices(data: SearchData) -> Iterable[str]:

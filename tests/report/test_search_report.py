@@ -243,6 +243,9 @@ def test_what_cannot_be_recorded_is_refused(one):
     _, folder = one
     data = read_search(folder)
     assert best_designs(data, 2) == [data.facts["best"].index(1), data.facts["rank"].index(2)]
+    front = made_up(300, np.random.default_rng(1))
+    ranks = [front.facts["rank"][k] for k in best_designs(front, 5)]
+    assert ranks == [1, 2, 8, 14, 20], "spread along the front"
     check_problem(data, problem("gain"))
     with pytest.raises(InputError, match=r"problem must be the one of the search demo-.*objectives"):
         check_problem(data, problem("gain", "mass"))
