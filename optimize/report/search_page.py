@@ -134,9 +134,10 @@ def designs_facts(data: SearchData, kept: Sequence[int]) -> dict[str, Any]:
             for key, head in ends.items()
         }
         columns["errors"] = columns["errors"] or [None for _ in kept]
+        shown = [*known, *(value for head in [*ends.values()][1:] for value in data.values.get(head, ()))]
         return {
             "name": name, "unit": row.get("unit", ""), "largest": row.get("direction") == "largest",
-            "logarithmic": _spread(known), "values": list(map(number_or_none, of(known))), **columns,
+            "logarithmic": _spread(shown), "values": list(map(number_or_none, of(known))), **columns,
         }  # fmt: skip
 
     fresh, quantities = data.facts.get(f"starts{FRESH_STARTS}", ()), _quantities(data)
@@ -236,7 +237,9 @@ def _curve(label: str, values: Sequence[float]) -> dict[str, Any]:
 
 
 def _panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
-    every = [value for one in curves for value in one["values"] if value is not None]
+    sides = [one.get(name, ()) for one in curves for name in ("values", "low", "high")]
+    sides += [[mark["value"], mark["low"], mark["high"]] for mark in marks]
+    every = [value for side in sides for value in side if value is not None]
     return {
         "title": title, "unit": unit, "logarithmic": _spread(every), "curves": curves, "marks": list(marks)
     }  # fmt: skip

@@ -4,6 +4,7 @@ import html
 import json
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from tisim.optimize.report.search_data import read_search, search_names
 from tisim.optimize.report.search_page import SearchPageOptions, search_html, search_report
 from tisim.optimize.search import search
 from tisim.optimize.storage.cache import Cache
+from tisim.optimize.tables import LOW
 
 
 @pytest.fixture(scope="module")
@@ -203,6 +205,16 @@ def test_curves_are_those_of_the_logbook(one):
     (mark,) = panel["marks"]
     assert mark["value"] == pytest.approx(outcome.designs[0].values["gain"], rel=1e-6)
     assert [mark["low"], mark["high"]] == pytest.approx(outcome.designs[0].intervals["gain"], rel=1e-6)
+
+
+def test_an_axis_is_logarithmic_if_all_that_it_shows_is_positive(rng):
+    data = made_up(50, rng, ("loss",))
+    positive = {name: np.geomspace(1e-3, 1.0, 50).tolist() for name in data.values}
+    data = replace(data, values=positive)
+    assert page_of(data)[0]["designs"]["objectives"][0]["logarithmic"]
+    low = next(name for name in positive if LOW in name)
+    data = replace(data, values=positive | {low: [-0.1] * 50})
+    assert not page_of(data)[0]["designs"]["objectives"][0]["logarithmic"]
 
 
 def test_the_worst_designs_are_left_out_to_keep_the_limit(rng, tmp_path):
