@@ -32,7 +32,7 @@ from tisim.report import run_report
 from tisim.report.compressed_trajectory import compress
 from tisim.report.contact_network import contact_network
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.run_report import ReportOptions
+from tisim.report.viewer_data import ReportOptions
 from tisim.steppers import FixedStep, Verlet
 
 SPACING, STEP, MOST_STEPS = 1.2e-3, 1e-5, 10_000

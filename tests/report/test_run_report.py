@@ -24,7 +24,8 @@ from tisim.io.reader import frames
 from tisim.plotting import style
 from tisim.report import run_report as write
 from tisim.report.page import SCRIPTS
-from tisim.report.run_report import SIZE_LIMIT, ReportOptions, read_checks
+from tisim.report.run_report import read_checks
+from tisim.report.viewer_data import SIZE_LIMIT, ReportOptions
 
 
 def facts_of(path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,14 +21,14 @@ from tisim.cli.options import (
     Threads,
     nameable,
 )
-from tisim.console import err, progress_bar
+from tisim.console import err, shown_progress
 from tisim.errors import InputError, must
 from tisim.files import output_folder, pictures, regular_file
 from tisim.files.output_folder import resumes
 from tisim.streams import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from matplotlib.figure import Figure
 
@@ -168,7 +166,8 @@ def report(
     """
     from tisim.io.reader import frames
     from tisim.plotting.time_series import mark_missing
-    from tisim.report.run_report import ReportOptions, read_checks, run_report
+    from tisim.report.run_report import read_checks, run_report
+    from tisim.report.viewer_data import ReportOptions
 
     file = _trajectory_file(file)
     path = to or file.parent / "report.html"
@@ -223,7 +222,7 @@ def figures(
     )
     output_folder.claim(out_folder, (output_folder.LOCK,), overwrite)
     with output_folder.lock(out_folder):
-        with _progress("running") as progress:
+        with shown_progress("running") as progress:
             results = chosen_case.figures(size_name, progress)
         output_folder.claim(out_folder, results, overwrite)
         # Write numbers first, so that a figure that cannot be drawn does not lose them.
@@ -266,7 +265,7 @@ def movie(
         look = Look.of(colour, view, crop, tuple(clip or ()))
         check(trajectory, path, rate)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
-        with _progress("drawing") as progress:
+        with shown_progress("drawing") as progress:
             draw(trajectory, path, rate, progress, look)
         _print_missing(trajectory.missing)
     print(path)
@@ -297,7 +296,7 @@ def export(
     check(file, kind, names)
     out_folder = folder or file.parent
     output_folder.claim(out_folder, file_names(file, kind), overwrite)
-    with _progress("writing") as progress:
+    with shown_progress("writing") as progress:
         path = write(file, kind, out_folder, progress, names)
     for world in range(count := world_count(file)):
         with frames(file, world) as trajectory:
@@ -334,10 +333,3 @@ def _trajectory_file(path: Path) -> Path:
                 f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
-
-
-@contextmanager
-def _progress(what: str) -> Iterator[Callable[[float], None]]:
-    with progress_bar("{task.description}", console=err()) as bar:
-        task = bar.add_task(what, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)

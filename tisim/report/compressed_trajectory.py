@@ -21,10 +21,10 @@ import numpy as np
 from tisim.domains.domain import Domain
 from tisim.effects.base import Shaped
 from tisim.effects.base.shaped import ORIENTATION
+from tisim.engine.assembly import units
 from tisim.errors import Words, must
 from tisim.io.h5md import ABSENT
 from tisim.io.reader import Frame
-from tisim.io.run_folder import units
 from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.columns import WHOLE_TYPES, Column, Scale, column, rounded, uniform_scale, whole_numbers
 from tisim.scene.initial_state import Arrays

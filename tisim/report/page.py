@@ -39,6 +39,7 @@ class Page:
     title : text. state : "ok", "failed" or "unfinished". verdict, summary : text beside and below the title.
     notices : sentences above the view. sections : in order. footer : paragraphs.
     facts : plain data for the scripts. recording : bytes for them.
+    kind : "report", or "cell" for the output of a cell of a notebook, which shows the view alone.
     """
 
     title: str
@@ -50,6 +51,7 @@ class Page:
     notices: Sequence[str] = ()
     sections: Sequence[Section] = ()
     footer: Sequence[str] = field(default_factory=tuple)
+    kind: str = "report"
 
     def html(self) -> str:
         """Return the page as HTML."""
@@ -61,6 +63,7 @@ class Page:
         links = "".join(f'<a href="#{one.name}">{escape(one.title)}</a>' for one in self.sections)
         return Template(static("page.html")).substitute(
             policy=policy,
+            kind=escape(self.kind),
             version=escape(__version__),
             title=escape(self.title),
             style=style,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import cast
@@ -23,47 +22,23 @@ from tisim.plotting.style import superscripts
 from tisim.reading import read
 from tisim.report import tables
 from tisim.report.columns import Column
-from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence, compress
-from tisim.report.contact_network import ContactNetwork, contact_network, has_contacts
+from tisim.report.compressed_trajectory import CompressedTrajectory
 from tisim.report.kept_frames import KeptFrames
 from tisim.report.page import Page, Section, picture, table
-from tisim.report.scenery import colour_maps, scenery
+from tisim.report.viewer_data import ReportOptions, viewer_data
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.version import __version__
 
-SIZE_LIMIT = 15.0
-"""Default for the largest size of a report, MB (10^6 bytes)."""
-RESERVED_BYTES, LEAST_ROOM, SIZE_ATTEMPTS = 0.25e6, 0.1e6, 4
-"""Bytes that are reserved at first for everything but the recording and the pictures, and the least for the
-recording; the number of attempts to keep the limit with more reserved."""
+RESERVED_BYTES, SIZE_ATTEMPTS = 0.25e6, 4
+"""Bytes that are reserved at first for everything but the recording and the pictures, and the number of
+attempts to keep the limit with more reserved."""
 LONGEST_VALUE = 160
 """Number of characters of a setting that are shown in the table."""
 LONGEST_TOML = 200_000
 """Number of characters from which on a scene is not shown as text."""
 CHECKS = ("case", "check", "measured", "half_interval", "expected", "allowed", "verdict")
 """Columns of the file of checks that are shown."""
-
-
-@dataclass(frozen=True)
-class ReportOptions:
-    """The choices for a report.
-
-    limit : largest size of the file, MB. Frames are left out until it is kept, and the page says so.
-    fields : quantities of the particles for colours; None for all.
-    contacts : whether to store the contacts of grains.
-    pictures : further pictures as PNG, by title.
-    checks : rows of text of a table of checks, from ``read_checks``.
-    """
-
-    limit: float = SIZE_LIMIT
-    fields: Sequence[str] | None = None
-    contacts: bool = True
-    pictures: Mapping[str, bytes] = field(default_factory=dict)
-    checks: Sequence[Sequence[str]] = ()
-
-    def __post_init__(self) -> None:
-        must(0.5 <= self.limit < np.inf, "limit", "at least 0.5 MB, and finite", self.limit)
 
 
 def read_checks(path: Path) -> list[list[str]]:
@@ -119,32 +94,23 @@ def run_page(
     # The function asks for a scene, times and frames alone.
     series = time_series.history(cast(Frames, sequence))
     times, panels = tables.time_series(series, scene, sequence.measures)
-    trajectory, network, notices = _recording(sequence, options, reserved)
+    data = viewer_data(sequence, options, reserved)
     state, verdict, sentences = _status(sequence, result)
     first, last = sequence[0].arrays, sequence[-1].arrays
-    lengths = [len(one.data) for one in trajectory.columns]
-    data = b"".join(one.data for one in trajectory.columns)
-    if network is not None:
-        lengths, data = [*lengths, len(network.data())], data + network.data()
-    facts = {
-        "name": scene.name, "trajectory": trajectory.facts(), "lengths": lengths,
-        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
-        "series": {"times": tables.digits(times), "curves": panels},
-        "maps": colour_maps(), "materials": list(scene.materials),
-    }  # fmt: skip
     ends = len(first["mass"]), len(last["mass"])
-    shown = f"{len(trajectory.times)} of {count}" if len(trajectory.times) < count else f"{count}"
+    frames_shown = len(data.trajectory.times)
+    shown = f"{frames_shown} of {count}" if frames_shown < count else f"{count}"
     number = f"{ends[0]:,}" if ends[0] == ends[1] else f"{ends[0]:,} at the start, {ends[1]:,} at the end"
     return Page(
         title=scene.name,
         state=state,
         verdict=verdict,
         summary=f"Particles: {number}. Frames: {shown}, from t = {times[0]:.6g} s to {times[-1]:.6g} s.",
-        facts=facts,
-        recording=data,
-        notices=[*sentences, *notices],
+        facts=data.facts | {"series": {"times": tables.digits(times), "curves": panels}},
+        recording=data.recording,
+        notices=[*sentences, *data.notices],
         sections=list(_sections(scene, result, (first, last), options)),
-        footer=[_rounding(trajectory), _versions(result)],
+        footer=[_rounding(data.trajectory), _versions(result)],
     )
 
 
@@ -172,42 +138,6 @@ def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list
         )
     status = result.status
     return ("ok", "ok", []) if status.ok else ("failed", "failed", [f"The run failed {status.reason}."])
-
-
-def _recording(
-    sequence: FrameSequence, options: ReportOptions, reserved: float
-) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
-    """Return the frames that the limit allows, with their contacts, and sentences about those left out."""
-    room = options.limit * 1e6 - reserved - sum(4 / 3 * len(png) for png in options.pictures.values())
-    room = 0.75 * max(room, LEAST_ROOM)
-    count, particles = len(sequence), max(len(sequence[k].arrays["id"]) for k in (0, -1))
-    # A particle usually takes a byte or more in a frame; frames that would hardly fit are not read.
-    stride, part = max(1, int(count * particles // room)), 1
-    while True:
-        chosen = sorted({*range(0, count, stride), count - 1})
-        trajectory = compress(sequence, chosen, part, options.fields)
-        excess = trajectory.size() / room
-        if excess <= 1:
-            break
-        if len(chosen) > 2:
-            stride = min(max(stride + 1, int(stride * excess)), max(count - 1, 1))
-        else:
-            part = max(part + 1, int(part * excess) + 1)
-    notices = []
-    if len(chosen) < count:
-        notices.append(
-            f"To keep this file below {options.limit:g} MB, it has one frame in {stride} and the last: "
-            f"{len(chosen)} of {count}. The curves below use all frames."
-        )
-    if part > 1:
-        notices.append(f"Only particles whose id is a multiple of {part} are shown, for the same reason.")
-    network = None
-    if options.contacts and has_contacts(sequence.scene):
-        network = contact_network(sequence, trajectory)
-        if network is not None and trajectory.size() + len(network.data()) > room:
-            network = None
-            notices.append("The contacts are left out, because they do not fit this size.")
-    return trajectory, network, notices
 
 
 def _sections(

@@ -157,7 +157,7 @@ class Player {
     this.place.append(stage,
       group("Playback", element("div", { class: "transport" },
         button(icon("M4 3h2v10H4z M13 3v10L7 8z"), "First frame", () => { this.play(false); this.go(0); }), this.playButton, this.slider, this.clock), rate.label),
-      element("details", { class: "settings", open: innerWidth > 700 }, element("summary", {}, "Colours, sizes, cut, view, downloads"),
+      element("details", { class: "settings", open: innerWidth > 700 && !document.body.classList.contains("cell") }, element("summary", {}, "Colours, sizes, cut, view, downloads"),
         element("div", { class: "columns" }, group("Colours", this.colour.label, this.maps.label, range),
         group("Sizes", sizes.label, element("label", {}, element("span", {}, "Scale"), scale), element("label", {}, element("span", {}, "Particle id"), search)),
         group("Clipping plane", this.cutAxis.label, this.cutPlace),
