@@ -107,7 +107,6 @@ class _Search:
         except _OutOfTime:
             self.outcome.stopped = "wall clock"
         decode = self.problem.genome.decode
-        self.outcome.limits = {one: individual.limits for one, individual in self.known.items()}
         self.outcome.quantities = {one: self.ensemble.values(decode(one)) for one in self.outcome.estimates}
         self._store()
         return self.outcome
@@ -222,6 +221,7 @@ class _Search:
                 known = self.outcome.failures if individual.failed else self.outcome.estimates
                 known[tuple(individual)] = estimates
                 self.known.setdefault(tuple(individual), individual)
+                self.outcome.generations.setdefault(tuple(individual), generation)
         self._constrain(fresh)
         return sum(individual.fitness.valid for individual in fresh)
 
@@ -314,4 +314,5 @@ class _Search:
         out.hall.fill(self.hall.individuals if self.ranked is None else self.ranked)
         out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits
         out.elapsed_s = time.monotonic() - self.began
+        out.limits = {one: individual.limits for one, individual in self.known.items()}
         store(self.cache, out)

@@ -123,13 +123,18 @@ def check_problem(folder: Path, command: str, cache: Cache, requested: Mapping[s
             f"of a {command} of this version of the program (or give --out or --overwrite)",
             str(folder),
         )
-        differences = _differences(of_the_problem(stored), of_the_problem(requested))
+        differences = different_problem(stored, requested)
         if differences:
             raise InputError(
                 f"output folder must be free of a {command} of another problem; received {str(folder)!r}, "
                 f"which holds one that differs ({'; '.join(differences)}). Use another --out, or --overwrite "
                 "to replace it"
             )
+
+
+def different_problem(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:
+    """Return the differences between the problems of two identities of searches, in words."""
+    return _differences(of_the_problem(stored), of_the_problem(requested))
 
 
 @contextmanager

@@ -17,10 +17,13 @@ from tisim.optimize.problem.problem import Problem
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.storage.hdf5_store import CONSTRAINTS_TABLE, GENES_TABLE, OBJECTIVES_TABLE
 from tisim.optimize.storage.record import canonical
-from tisim.optimize.tables import attributes, best_columns, logbook_columns
+from tisim.optimize.tables import attributes, best_columns, logbook_columns, searched_designs
 
 WARM_START = "warm_start"
 """Name of the table of the known designs of a warm start; its checksum has this key in an identity."""
+DESIGNS_TABLE, COMMAND_TABLE = "designs", "command"
+"""Names of the tables, below a search, of its designs (with ``genes`` and ``values`` below), and of the words of
+the command that began it."""
 
 
 def store(cache: Cache, outcome: Outcome) -> None:
@@ -50,9 +53,21 @@ def store(cache: Cache, outcome: Outcome) -> None:
     ):
         about = {heading: one for heading, one in attributes(problem).items() if heading in columns}
         cache.put_table(f"{name}/{below}", columns, about=about)
+    designs = searched_designs(
+        problem, outcome.generations, {**outcome.estimates, **outcome.failures}, outcome.limits, outcome.hall,
+        outcome.best,
+    )  # fmt: skip
+    for below, columns in (("", designs.facts), ("/genes", designs.genes), ("/values", designs.values)):
+        cache.put_table(f"{name}/{DESIGNS_TABLE}{below}", columns)
     cache.put_table(name, {}, of_search)
     if outcome.stopped or not outcome.logbook:
         cache.fold()
+
+
+def store_command(cache: Cache, search: str, words: Sequence[str]) -> None:
+    """Store the command that began a search, or goes on with it: its name, arguments and options."""
+    if words:
+        cache.put_table(f"{search}/{COMMAND_TABLE}", {"word": list(words)})
 
 
 def beginning_tables(outcome: Outcome) -> dict[str, dict[str, list[Any]]]:

@@ -4,7 +4,7 @@ results."""
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +39,8 @@ from tisim.optimize.search_folder import (
     check_problem,
     results_of,
 )
-from tisim.optimize.settings import Settings, fit, identity, proposed
+from tisim.optimize.search_records import store_command
+from tisim.optimize.settings import Settings, fit, identity, proposed, search_name
 from tisim.optimize.storage.cache import Cache
 from tisim.optimize.warm_start import warmed
 
@@ -124,6 +125,7 @@ def session(
     overwrite: bool = False,
     begun: bool = False,
     beginning: Beginning = NOTHING,
+    command: Sequence[str] = (),
 ) -> Outcome:
     """Start or resume a search in the folder, and write the files listed in optimize.search_folder.
 
@@ -131,6 +133,7 @@ def session(
     stopping : called on Ctrl-C, which ends the search cleanly (Outcome.interrupted).
     overwrite : replace files of other origin that have the same names.
     begun : refuse a search that has not begun in the folder.
+    command : the words of the command that is given, which are stored.
 
     InputError if the folder contains searches of another problem or files of other origin, or cannot be
     written. Meanwhile other processes may join the search, or run other searches of the problem, but not
@@ -148,6 +151,7 @@ def session(
                 bar.print(f"{what} {folder / SEARCH_FILE}, which has {len(cache)} runs", highlight=False)
             if beginning.warm is not None:
                 bar.print(f"a warm start from {len(beginning.warm)} designs", highlight=False)
+            store_command(cache, search_name(requested), command)
             outcome = _search_with_display(problem, settings, beginning, evaluator, cache, bar, stopping)
         paths = [folder / SEARCH_FILE]
         if outcome.best is not None:

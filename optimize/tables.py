@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from deap import tools
@@ -23,6 +24,8 @@ Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
 """Estimates of designs, by their points of the unit cube."""
 FEASIBLE = "feasible"
 """Heading of the column that says whether a design satisfies the constraints of the result."""
+UNKNOWN = FitnessEstimate(math.nan, math.nan, math.nan, math.nan, 0, False)
+"""The estimate of a value that is not known."""
 
 
 def best_columns(problem: Problem, hall: Sequence[Individual]) -> dict[str, list[Any]]:
@@ -151,6 +154,81 @@ def design_columns(problem: Problem, estimates: Estimates, limits: Estimates) ->
     columns["converged"] = [e.converged for e in first]
     columns["failed"] = [e.reason for e in first]
     return columns
+
+
+@dataclass(frozen=True)
+class SearchedDesigns:
+    """All designs of a search as tables with a row for each, in the order of their first estimation.
+
+    facts : gen (the generation of the first estimation), rank (in the hall of fame from 1, 0 outside), best
+        (1 for the best design, or the compromise of a front), starts, starts from held-out seeds, converged
+        (1 or 0), feasible ("yes", "unproven", "no"), failed (the reason, or "").
+    genes : the genes, by name, in their units.
+    values : by name, the mean of each objective and of each constraint of the result with its standard error,
+        and, if there are any, the mean from held-out starts with the ends of its 95 % interval. NaN if not
+        known.
+    """
+
+    facts: dict[str, list[Any]]
+    genes: dict[str, list[Any]]
+    values: dict[str, list[float]]
+
+
+def searched_designs(
+    problem: Problem,
+    generations: Mapping[tuple[float, ...], int],
+    estimates: Estimates,
+    limits: Estimates,
+    hall: Sequence[Individual],
+    best: Individual | None,
+) -> SearchedDesigns:
+    """Return all designs of a search.
+
+    generations : generation of the first estimation of each design, in order. estimates : of the objectives,
+        failed designs included. limits : of the constraints of the result. best : of the hall.
+    """
+    members = {tuple(individual): (rank, individual) for rank, individual in enumerate(hall, start=1)}
+    found = [members.get(point, (0, None)) for point in generations]
+    designs = [problem.genome.decode(point) for point in generations]
+    of_all, constraints = [estimates[point] for point in generations], problem.result_constraints
+    limited = [
+        (limits.get(point) or (UNKNOWN,) * len(constraints)) if known[0].ok else (UNKNOWN,) * len(constraints)
+        for point, known in zip(generations, of_all, strict=True)
+    ]
+    again = [() if one is None else one.confirmed for _, one in found]
+    again_limited = [() if one is None else one.confirmed_limits for _, one in found]
+    values: dict[str, list[float]] = {}
+
+    def add(k: int, name: str, sign: float, mine: Sequence[Any], held_out: Sequence[Any]) -> None:
+        values[name] = [sign * one[k].mean if one[k].ok else math.nan for one in mine]
+        values[error_of(name)] = [one[k].standard_error for one in mine]
+        if any(held_out):
+            known = [one[k] if one else UNKNOWN for one in held_out]
+            ends = [sorted((sign * one.low, sign * one.high)) for one in known]
+            values[f"{name}{FRESH_STARTS}"] = [sign * one.mean for one in known]
+            values[f"{name} {LOW}{FRESH_STARTS}"] = [low for low, _ in ends]
+            values[f"{name} {HIGH}{FRESH_STARTS}"] = [high for _, high in ends]
+
+    for k, objective in enumerate(problem.objectives):
+        add(k, objective.name, objective.sign, of_all, again)
+    for k, constraint in enumerate(constraints):
+        add(k, constraint.name, 1.0, limited, again_limited)
+    reported = zip(of_all, limited, again_limited, strict=True)
+    facts = {
+        "gen": list(generations.values()),
+        "rank": [rank for rank, _ in found],
+        "best": [int(one is not None and one is best) for _, one in found],
+        "starts": [one[0].starts for one in of_all],
+        f"starts{FRESH_STARTS}": [one[0].starts if one else 0 for one in again],
+        "converged": [int(one[0].converged) for one in of_all],
+        FEASIBLE: [
+            ANSWERS[feasible(constraints, fresh or first)] if known[0].ok else ""
+            for known, first, fresh in reported
+        ],
+        "failed": [one[0].reason for one in of_all],
+    }
+    genes = {gene.name: [design[gene.name] for design in designs] for gene in problem.genome.genes}
+    return SearchedDesigns(facts, genes, values)
 
 
 def error_of(name: str) -> str:

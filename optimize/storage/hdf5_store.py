@@ -60,6 +60,12 @@ Runs of a search for good designs, written by tisim (optimize.read reads it; so 
     experiments          designs that it learnt from as it began, as they were measured
     warm_start           the same of designs that other searches in this file had run by then
     logbook              a row for each generation
+    command              the words of the command that began it, if it was a command
+    designs              a row for each design, in the order of their first estimation: gen, the generation of
+                         it; rank in the hall of fame (0: outside), best, starts, converged, feasible, failed
+    designs/genes        its genes
+    designs/values       the mean of each objective and constraint and its standard error; of reported designs
+                         also the mean from fresh starts and the ends of its interval
     hall_of_fame         the best designs, the best first; of several objectives the front. Each objective is
                          the mean over the starts; "95 % +-" is half of its confidence interval
 

@@ -19,8 +19,15 @@ from typing import Any
 
 from tisim.version import __version__
 
-SCRIPTS = ("trajectory.js", "viewer.js", "player.js", "chart.js", "page.js")
-"""The scripts of a page, in order."""
+COMMON_SCRIPTS = ("parts.js", "chart.js", "page.js")
+PARTICLE_SCRIPTS = ("trajectory.js", "viewer.js", "player.js")
+PLOT_SCRIPTS = ("plot.js", "scatter.js", "rows.js")
+RUN_SCRIPTS = (*COMMON_SCRIPTS, *PARTICLE_SCRIPTS, "run.js")
+COST_SCRIPTS = (*COMMON_SCRIPTS, *PLOT_SCRIPTS, "cost.js")
+SEARCH_SCRIPTS = (*COMMON_SCRIPTS, *PARTICLE_SCRIPTS, *PLOT_SCRIPTS, "parallel.js", "search.js")
+"""The scripts of the pages of a run, of a study of costs and of a search, in order; the last one begins."""
+PARTICLE_VIEW = '<section id="viewer" class="waiting" aria-label="Particles"></section>'
+"""The place of the view of the particles."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,7 @@ class Page:
     notices : sentences above the view. sections : in order. footer : paragraphs.
     facts : plain data for the scripts. recording : bytes for them.
     kind : "report", or "cell" for the output of a cell of a notebook, which shows the view alone.
+    scripts : names of files in ``static``. view : HTML above the sections.
     """
 
     title: str
@@ -52,10 +60,12 @@ class Page:
     sections: Sequence[Section] = ()
     footer: Sequence[str] = field(default_factory=tuple)
     kind: str = "report"
+    scripts: Sequence[str] = RUN_SCRIPTS
+    view: str = PARTICLE_VIEW
 
     def html(self) -> str:
         """Return the page as HTML."""
-        style, script = static("page.css"), f'"use strict";\n{"".join(map(static, SCRIPTS))}'
+        style, script = static("page.css"), f'"use strict";\n{"".join(map(static, self.scripts))}'
         policy = (
             f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; img-src data: blob:; "
             "base-uri 'none'; form-action 'none'"
@@ -74,6 +84,7 @@ class Page:
             notices="\n".join(
                 f'<p class="warning {escape(self.state)}">{escape(text)}</p>' for text in self.notices
             ),
+            view=self.view,
             sections="\n".join(
                 f'<section id="{one.name}"><h2>{escape(one.title)}</h2>\n{one.html}\n</section>'
                 for one in self.sections
@@ -130,3 +141,11 @@ def picture(title: str, png: bytes) -> str:
         f"<figure><figcaption>{escape(title)}</figcaption>"
         f'<img alt="{escape(title)}" src="data:image/png;base64,{data}"></figure>'
     )
+
+
+def copied_text(name: str, text: str) -> str:
+    """Return text as HTML, with buttons to copy and to save it.
+
+    name : of the file as which a reader saves it.
+    """
+    return f'<pre data-file="{escape(name)}" tabindex="0">{escape(text)}</pre>'

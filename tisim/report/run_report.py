@@ -24,7 +24,7 @@ from tisim.report import tables
 from tisim.report.columns import Column
 from tisim.report.compressed_trajectory import CompressedTrajectory
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.page import Page, Section, picture, table
+from tisim.report.page import Page, Section, copied_text, picture, table
 from tisim.report.viewer_data import ReportOptions, viewer_data
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
@@ -201,7 +201,7 @@ def _asked(scene: Scene) -> str:
         return text + f"<p>As a file, the scene has {size:.3g} MB: scene.toml in the folder of the run.</p>"
     return text + (
         '<details class="block"><summary>The scene as a file, to run again or to change</summary>'
-        f'<pre id="toml" tabindex="0">{escape(toml)}</pre></details>'
+        f"{copied_text('scene.toml', toml)}</details>"
     )
 
 

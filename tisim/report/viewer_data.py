@@ -59,26 +59,25 @@ def viewer_data(sequence: FrameSequence, options: ReportOptions, reserved: float
 
     reserved : bytes of the page for everything but the recording and the pictures.
     """
-    trajectory, network, notices = _recording(sequence, options, reserved)
-    return ViewerData(trajectory, *_encoded(sequence, trajectory, network), notices)
+    trajectory, network, notices = recording(sequence, options, reserved)
+    facts, data = player_facts(sequence, trajectory, network)
+    return ViewerData(trajectory, facts | {"maps": colour_maps()}, data, notices)
 
 
-def _encoded(
+def player_facts(
     sequence: FrameSequence, trajectory: CompressedTrajectory, network: ContactNetwork | None
-) -> tuple[dict[str, Any], bytes]:
-    """Return the plain data and the recording of a viewer."""
-    streams = [one.data for one in trajectory.columns]
-    if network is not None:
-        streams.append(network.data())
+) -> tuple[dict[str, object], bytes]:
+    """Return what a browser needs to play a run: plain data, and the compressed frames."""
+    parts = [one.data for one in trajectory.columns] + ([network.data()] if network is not None else [])
     facts = {
-        "name": sequence.scene.name, "trajectory": trajectory.facts(), "lengths": list(map(len, streams)),
+        "name": sequence.scene.name, "trajectory": trajectory.facts(), "lengths": [len(one) for one in parts],
         "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
-        "maps": colour_maps(), "materials": list(sequence.scene.materials),
+        "materials": list(sequence.scene.materials),
     }  # fmt: skip
-    return facts, b"".join(streams)
+    return facts, b"".join(parts)
 
 
-def _recording(
+def recording(
     sequence: FrameSequence, options: ReportOptions, reserved: float
 ) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
     """Return the frames that the limit allows, with their contacts, and sentences about those left out."""

@@ -1,4 +1,5 @@
-/* Curves against time as SVG: a legend, a readout under the pointer, a mark at the time that is played. */
+/* Curves against time, or another quantity, as SVG: a legend, a readout under the pointer, a mark at the time that
+   is played. */
 
 /** Round values between two ends, at most a number of them. */
 function roundTicks(low, high, most) {
@@ -26,11 +27,14 @@ function axisUnit(largest, unit) {
 
 const HEIGHT = 230, MARGINS = { left: 62, right: 14, top: 12, bottom: 40 };
 const STROKES = ["c0", "c1", "c2", "c3", "c4", "c5"];
+const TIME = { name: "time", symbol: "t", unit: "s", whole: false };
 
 class Chart {
-  /** facts : title, unit, logarithmic, curves of label and values; times : s; jump : called with a time. */
-  constructor(place, facts, times, jump, fileName) {
-    Object.assign(this, { facts, times, jump, fileName, time: null });
+  /** facts : title, unit, logarithmic, curves of label and values, perhaps with low and high values of a band;
+      perhaps marks of x, value, low, high and label. times : horizontal places of the values, s.
+      jump : called with a time. axis : name, symbol and unit of the horizontal axis; whole: whole numbers alone. */
+  constructor(place, facts, times, jump, fileName, axis = TIME) {
+    Object.assign(this, { facts, times, jump, fileName, axis, time: null });
     this.drawing = element("svg", { class: "chart", role: "img", height: HEIGHT, "aria-label": this.summary() });
     this.readout = element("div", { class: "readout" });
     const save = (text, keep) => element("button", { type: "button", onclick: keep, "aria-label": `Save ${facts.title} as ${text}` }, text);
@@ -48,7 +52,7 @@ class Chart {
 
   summary() {
     const { title, curves, unit } = this.facts;
-    return `${title} against time; ` + curves.map(({ label, values }) => {
+    return `${title} against ${this.axis.name}; ` + curves.map(({ label, values }) => {
       const known = values.filter(Number.isFinite);
       return `${label || title} from ${quantity(known[0] ?? NaN, unit)} to ${quantity(known.at(-1) ?? NaN, unit)}`;
     }).join("; ");
@@ -60,7 +64,9 @@ class Chart {
     this.wide = wide;
     this.drawing.setAttribute("width", wide);
     this.drawing.setAttribute("viewBox", `0 0 ${wide} ${HEIGHT}`);
-    const values = facts.curves.flatMap((one) => one.values).filter((y) => Number.isFinite(y) && (!facts.logarithmic || y > 0));
+    const marks = facts.marks ?? [];
+    const values = [...facts.curves.flatMap((one) => [...one.values, ...(one.low ?? []), ...(one.high ?? [])]),
+      ...marks.flatMap((one) => [one.value, one.low, one.high])].filter((y) => Number.isFinite(y) && (!facts.logarithmic || y > 0));
     let [low, high] = values.reduce(([a, b], y) => [Math.min(a, y), Math.max(b, y)], [Infinity, -Infinity]);
     if (!(low <= high)) [low, high] = [0, 1];
     if (!facts.logarithmic) {
@@ -69,13 +75,15 @@ class Chart {
       [low, high] = [low === 0 ? 0 : low - room, high + room];
     } else if (low === high) [low, high] = [low / 2, high * 2];
     const { left, right, top, bottom } = MARGINS, scale = facts.logarithmic ? Math.log : (y) => y;
-    const [begin, end] = [times[0], times.at(-1) > times[0] ? times.at(-1) : times[0] + 1];
+    const last = Math.max(times.at(-1), ...marks.map((one) => one.x));
+    const [begin, end] = [times[0], last > times[0] ? last : times[0] + 1];
     this.x = (t) => left + (t - begin) / (end - begin) * (wide - left - right);
     this.y = (y) => HEIGHT - bottom - (scale(y) - scale(low)) / (scale(high) - scale(low)) * (HEIGHT - top - bottom);
-    const [byTime, timeUnit] = axisUnit(Math.max(Math.abs(begin), Math.abs(end)), "s");
+    const [byTime, timeUnit] = axisUnit(Math.max(Math.abs(begin), Math.abs(end)), this.axis.unit);
     const [by, unit] = facts.logarithmic ? [1, raised(facts.unit)] : axisUnit(Math.max(Math.abs(low), Math.abs(high)), facts.unit);
     const parts = [], text = (x, y, content, attributes = {}) => parts.push(element("text", { x, y, ...attributes }, content));
     for (const t of roundTicks(begin / byTime, end / byTime, Math.max(3, Math.floor(wide / 110)))) {
+      if (this.axis.whole && t % 1) continue;
       parts.push(element("line", { class: "grid", x1: this.x(t * byTime), x2: this.x(t * byTime), y1: top, y2: HEIGHT - bottom }));
       text(this.x(t * byTime), HEIGHT - bottom + 16, number(t, 5), { "text-anchor": "middle" });
     }
@@ -85,17 +93,30 @@ class Chart {
       const power = facts.logarithmic && Math.log10(y) % 1 === 0 ? raised(`10^${Math.log10(y)}`) : number(y / by, 5);
       text(left - 6, this.y(y) + 4, power, { "text-anchor": "end" });
     }
-    text((left + wide - right) / 2, HEIGHT - 6, `time (${timeUnit})`, { "text-anchor": "middle" });
+    text((left + wide - right) / 2, HEIGHT - 6, timeUnit ? `${this.axis.name} (${timeUnit})` : this.axis.name, { "text-anchor": "middle" });
     if (unit) text(14, (HEIGHT - bottom + top) / 2, unit, { "text-anchor": "middle", transform: `rotate(-90 14 ${(HEIGHT - bottom + top) / 2})` });
+    const drawn = (y) => Number.isFinite(y) && (!facts.logarithmic || y > 0);
+    facts.curves.forEach(({ low: lows, high: highs }, k) => {
+      if (!lows) return;
+      const known = [...times.keys()].filter((m) => drawn(lows[m]) && drawn(highs[m]));
+      const at = (ys) => (m) => `${this.x(times[m]).toFixed(1)} ${this.y(ys[m]).toFixed(1)}`;
+      const outline = [...known.map(at(highs)), ...[...known].reverse().map(at(lows))];
+      if (known.length) parts.push(element("path", { class: `band ${STROKES[k % STROKES.length]}`, d: `M${outline.join("L")}Z` }));
+    });
     facts.curves.forEach(({ values: ys }, k) => {
       let path = "", pen = false;
       ys.forEach((y, m) => {
-        const known = Number.isFinite(y) && (!facts.logarithmic || y > 0);
+        const known = drawn(y);
         if (known) path += `${pen ? "L" : "M"}${this.x(times[m]).toFixed(1)} ${this.y(y).toFixed(1)}`;
         pen = known;
       });
       parts.push(element("path", { class: `curve ${STROKES[k % STROKES.length]}`, d: path }));
     });
+    for (const { x, value, low: least, high: most } of marks) {
+      if (!drawn(value)) continue;
+      if (drawn(least) && drawn(most)) parts.push(element("line", { class: "mark", x1: this.x(x), x2: this.x(x), y1: this.y(least), y2: this.y(most) }));
+      parts.push(element("circle", { class: "mark", cx: this.x(x), cy: this.y(value), r: 4 }));
+    }
     if (facts.curves.length > 1) {
       let x = wide - right;
       for (const k of [...facts.curves.keys()].reverse()) {
@@ -120,9 +141,9 @@ class Chart {
   }
 
   point(event) {
-    const { left, right } = MARGINS, [begin, end] = [this.times[0], this.times.at(-1)];
-    const part = Math.max(0, Math.min(1, (event.offsetX - left) / (this.wide - left - right)));
-    this.over = this.nearest(begin + part * (end - begin));
+    const [first, last] = [this.x(this.times[0]), this.x(this.times.at(-1))];
+    const part = Math.max(0, Math.min(1, (event.offsetX - first) / (last - first || 1)));
+    this.over = this.nearest(this.times[0] + part * (this.times.at(-1) - this.times[0]));
     this.readout.textContent = this.latest();
     this.mark();
   }
@@ -130,7 +151,8 @@ class Chart {
   /** The values at the pointer, or at the time that is shown. */
   latest() {
     const k = this.over ?? (this.time === null ? this.times.length - 1 : this.nearest(this.time)), { unit, curves } = this.facts;
-    return `t = ${quantity(this.times[k], "s")}: ${curves.map(({ label, values }) => `${label ? `${label} ` : ""}${quantity(values[k], unit)}`).join(", ")}`;
+    const marks = (this.facts.marks ?? []).map((one) => `; ${one.label}: ${quantity(one.value, unit)}${one.low === null ? "" : ` (${quantity(one.low, unit)} to ${quantity(one.high, unit)})`}`).join("");
+    return `${this.axis.symbol} = ${quantity(this.times[k], this.axis.unit)}: ${curves.map(({ label, values }) => `${label ? `${label} ` : ""}${quantity(values[k], unit)}`).join(", ")}${marks}`;
   }
 
   mark() {
@@ -150,7 +172,7 @@ class Chart {
     const copy = this.drawing.cloneNode(true), own = [this.drawing, ...this.drawing.querySelectorAll("*")];
     [copy, ...copy.querySelectorAll("*")].forEach((part, k) => {
       const style = getComputedStyle(own[k]);
-      for (const name of ["fill", "stroke", "stroke-width", "stroke-dasharray", "font-family", "font-size"]) part.setAttribute(name, style.getPropertyValue(name));
+      for (const name of ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "font-family", "font-size"]) part.setAttribute(name, style.getPropertyValue(name));
       part.removeAttribute("class");
     });
     copy.querySelector("line:last-child")?.remove();
@@ -180,8 +202,14 @@ class Chart {
 
   csv() {
     const { curves, title, unit } = this.facts, named = (text) => (unit ? `${text} (${unit})` : text);
-    const rows = [["time (s)", ...curves.map(({ label }) => named(label ? `${title} ${label}` : title))]];
-    this.times.forEach((time, k) => rows.push([time, ...curves.map((one) => one.values[k])]));
+    const { axis } = this, head = axis.unit ? `${axis.name} (${axis.unit})` : axis.name;
+    const columns = curves.flatMap(({ label, values, low, high }) => {
+      const name = label ? `${title} ${label}` : title;
+      return [[named(name), values], ...(low ? [[named(`${name}, low`), low], [named(`${name}, high`), high]] : [])];
+    });
+    const rows = [[head, ...columns.map(([name]) => name)]];
+    this.times.forEach((time, k) => rows.push([time, ...columns.map(([, values]) => values[k])]));
+    for (const { x, value, low, high, label } of this.facts.marks ?? []) rows.push([x, named(label), value, low, high]);
     download(`${this.name()}.csv`, csv(rows), "text/csv");
   }
 }

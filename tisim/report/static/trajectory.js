@@ -153,3 +153,11 @@ class ContactNetwork {
     }
   }
 }
+
+/** The trajectory and the contacts of a run; bytes : its zlib streams, of the lengths in its facts. */
+async function decodeRun(facts, bytes) {
+  let begin = 0;
+  const parts = facts.lengths.map((length) => bytes.subarray(begin, begin += length));
+  const trajectory = await Trajectory.decode(facts.trajectory, parts);
+  return { trajectory, network: facts.network ? await ContactNetwork.decode(facts.network, parts.at(-1)) : null };
+}

@@ -567,7 +567,7 @@ class Viewer {
     this.asked = true;
     requestAnimationFrame(() => {
       this.asked = false;
-      this.draw(this.moving ? 1 : this.bestSamples());
+      if (this.programs) this.draw(this.moving ? 1 : this.bestSamples());
     });
   }
 
@@ -577,6 +577,13 @@ class Viewer {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => { this.moving = false; this.invalidate(); }, 180);
     this.invalidate();
+  }
+
+  /** Gives its memory on the graphics card back; nothing is drawn any more. */
+  release() {
+    clearTimeout(this.timer);
+    this.programs = null;
+    this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
   bestSamples() {
@@ -656,7 +663,7 @@ class Viewer {
 
   draw(samples = 1) {
     const { gl, canvas, options } = this;
-    if (!canvas.width || !canvas.height) return;
+    if (!this.programs || !canvas.width || !canvas.height) return;
     const lens = this.lens(), width = canvas.width * samples, height = canvas.height * samples;
     const image = this.target(width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, image.buffer);

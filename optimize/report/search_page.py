@@ -1,0 +1,379 @@
+"""The page of a search: one HTML file that shows its designs in a browser, without a network.
+
+It is made from the folder of the search alone. Clouds of designs are runs that are made for the page
+(``recorded_designs``), because a search keeps the values of its runs, and no particles.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tisim.errors import InputError, must
+from tisim.files.atomic import replace_file
+from tisim.optimize.report.recorded_designs import RecordedDesign
+from tisim.optimize.report.search_data import Row, RunOfDesign, SearchData, number_or_none, read_search
+from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW, error_of
+from tisim.report.page import SEARCH_SCRIPTS, Page, Section, copied_text, table
+from tisim.report.scenery import colour_maps
+from tisim.report.viewer_data import SIZE_LIMIT
+from tisim.version import __version__
+
+WIDE_RANGE = 100.0
+"""Values that are positive and spread over more than this factor are drawn on a logarithmic axis."""
+VIEW = (
+    '<aside id="design" aria-label="Chosen design" aria-live="polite"></aside>'
+    '<a id="shown" href="#design" aria-label="To the chosen design"></a>'
+)
+"""The places of the panel of the chosen design, and of its short form on narrow pages."""
+
+
+@dataclass(frozen=True)
+class SearchPageOptions:
+    """The choices for the page of a search.
+
+    limit : largest size of the file, MB. The designs with the worst fitness are left out until it is kept,
+        and the page says so.
+    scenes : scenes of designs as TOML, by the indices of the designs.
+    recorded : runs of designs.
+    """
+
+    limit: float = SIZE_LIMIT
+    scenes: Mapping[int, str] | None = None
+    recorded: Sequence[RecordedDesign] = ()
+
+    def __post_init__(self) -> None:
+        must(0.5 <= self.limit < math.inf, "limit", "at least 0.5 MB, and finite", self.limit)
+
+
+def search_report(
+    folder: str | Path, to: str | Path, search: str | None = None, options: SearchPageOptions | None = None
+) -> Path:
+    """Write the page of a search: one HTML file that a browser shows without a network; return its path.
+
+    folder : of the search, or its search.h5. to : file to write, replaced if it exists. search : its name, if
+    several share the folder; by default the one that ended last.
+
+    Raise InputError if there is no search, or if the limit is too small; RunError if the disk is full.
+    """
+    path = Path(to)
+    replace_file(path, search_html(read_search(folder, search), options).encode())
+    return path
+
+
+def search_html(data: SearchData, options: SearchPageOptions | None = None) -> str:
+    """Return the page of a search as HTML. InputError if the limit is too small for a single design."""
+    chosen = options or SearchPageOptions()
+    kept = list(range(len(data)))
+    while True:
+        html = search_page(data, chosen, kept).html()
+        size = len(html.encode())
+        if size <= 1e6 * chosen.limit:
+            return html
+        if len(kept) < 2:
+            raise InputError(
+                f"limit must be large enough for the recorded designs, such as {2e-6 * size:.3g} MB; "
+                f"received {chosen.limit:g} MB"
+            )
+        kept = _best(data, kept, int(0.9 * len(kept) * min(1.0, 1e6 * chosen.limit / size)) or 1)
+
+
+def search_page(data: SearchData, options: SearchPageOptions, kept: Sequence[int]) -> Page:
+    """Return the page of a search with some of its designs, by increasing index."""
+    recordings, blobs = [], []
+    for one in options.recorded:
+        if one.design in kept:
+            recordings.append({"design": kept.index(one.design), "about": one.about, **one.facts})
+            blobs.append(one.data)
+    several = len(data.objectives) > 1
+    scenes = {kept.index(k): toml for k, toml in _scenes(data, options).items() if k in kept}
+    facts = {
+        "name": data.name, "several": several, "generations": list(data.logbook.get("gen", ())),
+        "convergence": list(convergence(data)), "designs": designs_facts(data, kept),
+        "quantities": _quantities(data), "maps": colour_maps(), "recordings": recordings,
+        "scenes": scenes, "command": shlex.join(["tisim", *data.command]) if data.command else "",
+    }  # fmt: skip
+    notices = list(_notices(data))
+    if len(kept) < len(data):
+        notices.append(
+            f"To keep this file below {options.limit:g} MB, it has the best {len(kept)} of {len(data)} designs."
+        )
+    ended = {"": "not ended", "interrupted": "interrupted", "target": "target reached"}
+    return Page(
+        title=data.title,
+        state="unfinished" if data.stopped in ("", "interrupted") else "ok",
+        verdict=ended.get(data.stopped, f"ended by {data.stopped}"),
+        summary=_summary(data),
+        facts=facts,
+        recording=b"".join(blobs),
+        notices=notices,
+        sections=list(_sections(data, bool(recordings), several)),
+        footer=[f"Search {data.name}. {_versions(data)} Written by tisim {__version__}."],
+        scripts=SEARCH_SCRIPTS,
+        view=VIEW,
+    )
+
+
+def designs_facts(data: SearchData, kept: Sequence[int]) -> dict[str, Any]:
+    """Return some designs as plain data by column."""
+
+    def of(column: Sequence[Any]) -> list[Any]:
+        return [column[k] for k in kept]
+
+    def values(row: Row) -> dict[str, Any]:
+        name = row["name"]
+        known = data.values.get(name, [math.nan] * len(data))
+        ends = {"errors": error_of(name), "fresh": f"{name}{FRESH_STARTS}"}
+        ends |= {"low": f"{name} {LOW}{FRESH_STARTS}", "high": f"{name} {HIGH}{FRESH_STARTS}"}
+        columns = {
+            key: [number_or_none(value) for value in of(data.values[head])] if head in data.values else None
+            for key, head in ends.items()
+        }
+        columns["errors"] = columns["errors"] or [None for _ in kept]
+        return {
+            "name": name, "unit": row.get("unit", ""), "largest": row.get("direction") == "largest",
+            "logarithmic": _spread(known), "values": [number_or_none(value) for value in of(known)], **columns,
+        }  # fmt: skip
+
+    fresh, quantities = data.facts.get(f"starts{FRESH_STARTS}", ()), _quantities(data)
+    return {
+        "genes": [_gene(row, of(data.design_genes[row["name"]])) for row in data.genes if len(data)],
+        "objectives": [values(row) for row in data.objectives],
+        "constraints": [values(row) for row in data.constraints if row["name"] in data.values],
+        "gen": of(data.facts.get("gen", ())), "rank": of(data.facts.get("rank", ())),
+        "best": of(data.facts.get("best", ())), "starts": of(data.facts.get("starts", ())),
+        "freshStarts": of(fresh), "feasible": of(data.facts.get(FEASIBLE, ())),
+        "failed": of(data.facts.get("failed", ())),
+        "runs": [[_run(run, quantities) for run in data.runs[k]] for k in kept],
+    }  # fmt: skip
+
+
+def _gene(row: Row, values: Sequence[Any]) -> dict[str, Any]:
+    choices = None
+    if "choices" in row:
+        choices = json.loads(row["choices"])
+    elif any(isinstance(value, str | bool) for value in values):
+        choices = list(dict.fromkeys(values))
+    searched = "low" in row or "choices" in row
+    return {
+        "name": row["name"], "unit": row.get("unit", ""), "low": row.get("low"), "high": row.get("high"),
+        "logarithmic": row.get("scale") == "log", "choices": choices,
+        "varied": searched or len(set(values)) > 1, "values": list(values),
+    }  # fmt: skip
+
+
+def _run(run: RunOfDesign, names: Sequence[str]) -> dict[str, Any]:
+    return {
+        "start": run.start, "fresh": run.held_out, "seed": run.seed, "reason": run.reason,
+        "values": [number_or_none(run.values.get(name, math.nan)) for name in names],
+        "wall": number_or_none(run.wall_s, 3),
+    }  # fmt: skip
+
+
+def _quantities(data: SearchData) -> list[str]:
+    """Return the names of the values of runs, in order."""
+    return list(dict.fromkeys(name for of_it in data.runs for run in of_it[:1] for name in run.values))
+
+
+def _spread(values: Sequence[float]) -> bool:
+    """Return whether a logarithmic axis suits values."""
+    known = [value for value in values if math.isfinite(value)]
+    return bool(known) and min(known) > 0 and max(known) > WIDE_RANGE * min(known)
+
+
+def _best(data: SearchData, kept: Sequence[int], count: int) -> list[int]:
+    """Return the best of designs: those of the hall of fame, and those with the best value of an objective."""
+    order = {k: (0 if data.facts["rank"][k] else 1, math.inf) for k in kept}
+    for row in data.objectives:
+        sign = -1.0 if row.get("direction") == "largest" else 1.0
+        costs = {k: sign * data.values[row["name"]][k] for k in kept}
+        ranked = sorted(kept, key=lambda k: (math.isnan(costs[k]), costs[k]))
+        for place, k in enumerate(ranked):
+            order[k] = order[k][0], min(order[k][1], place)
+    return sorted(sorted(kept, key=lambda k: order[k])[:count])
+
+
+def convergence(data: SearchData) -> Iterable[dict[str, Any]]:
+    """Yield the panels of curves by generation: the best and the mean fitness, or the best value of each of
+    several objectives; then the derived values, the starts, the failed designs and the search box."""
+    log = data.logbook
+    if not log or not log.get("gen"):
+        return
+
+    def numbers(heading: str) -> list[float | None]:
+        return [number_or_none(value) for value in log[heading]]
+
+    def panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
+        every = [value for one in curves for value in one["values"] if value is not None]
+        wide = _spread(every)
+        return {"title": title, "unit": unit, "logarithmic": wide, "curves": curves, "marks": list(marks)}
+
+    marks = list(_held_out_best(data))
+    if len(data.objectives) == 1:
+        (objective,) = data.objectives
+        mean, std = log["mean"], log["std"]
+        ends = [(m - s, m + s) for m, s in zip(mean, std, strict=True)]
+        yield panel(
+            f"{objective['name']}: best, and mean and standard deviation of the population",
+            objective.get("unit", ""),
+            [
+                {"label": "best", "values": numbers("best")},
+                {
+                    "label": "mean", "values": numbers("mean"),
+                    "low": [number_or_none(low) for low, _ in ends],
+                    "high": [number_or_none(high) for _, high in ends],
+                },
+            ],
+            marks,
+        )  # fmt: skip
+    unit_of = {row["name"]: row.get("unit", "") for row in data.objectives}
+    own = {"gen", "best", "mean", "std", "recentred"}
+    titles = {
+        "starts": "new runs of a generation", "designs": "new designs of a generation",
+        "failed": "failed designs of a generation", "box": "mean width of the search box",
+        "front": "designs in the front",
+    }  # fmt: skip
+    for heading, values in log.items():
+        if heading in own or not all(isinstance(value, int | float) for value in values):
+            continue
+        known = {value for value in values if math.isfinite(value)}
+        name = next((one for one in unit_of if heading.startswith(f"best {one}")), None)
+        if name is not None:
+            mine = [mark for mark in marks if mark["name"] == name]
+            yield panel(heading, unit_of[name], [{"label": "", "values": numbers(heading)}], mine)
+        elif len(known) > 1:
+            yield panel(titles.get(heading, heading), "", [{"label": "", "values": numbers(heading)}])
+
+
+def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
+    """Yield the value of each objective of the best design from held-out starts, with its interval."""
+    best = next((k for k, one in enumerate(data.facts.get("best", ())) if one), None)
+    if best is None or len(data.objectives) > 1:
+        return
+    for row in data.objectives:
+        name = row["name"]
+        heads = (f"{name}{FRESH_STARTS}", f"{name} {LOW}{FRESH_STARTS}", f"{name} {HIGH}{FRESH_STARTS}")
+        value, low, high = (number_or_none(data.values[head][best]) if head in data.values else None for head in heads)
+        if value is not None:
+            label = "best from fresh starts, 95 % interval"
+            last = data.logbook["gen"][-1]
+            yield {"name": name, "x": last + 0.5, "value": value, "low": low, "high": high, "label": label}
+
+
+def _scenes(data: SearchData, options: SearchPageOptions) -> dict[int, str]:
+    """Return the scenes of designs as TOML, by index."""
+    scenes = dict(options.scenes or {})
+    best = next((k for k, one in enumerate(data.facts.get("best", ())) if one), None)
+    if data.best_scene and best is not None:
+        scenes.setdefault(best, data.best_scene)
+    return scenes
+
+
+def _notices(data: SearchData) -> Iterable[str]:
+    if not data.stopped:
+        yield "The search has not ended: this page shows it as far as its file has it."
+    if not len(data):
+        yield "No generation has finished yet."
+    best = next((k for k, one in enumerate(data.facts.get("best", ())) if one), None)
+    if best is not None and data.constraints:
+        answer = data.facts[FEASIBLE][best]
+        if answer == "no":
+            yield "No design satisfies the constraints; the first one violates them least."
+        elif answer == "unproven":
+            yield "The best design may violate a constraint: an interval contains a bound, or is not known."
+
+
+def _summary(data: SearchData) -> str:
+    failed = sum(bool(reason) for reason in data.facts.get("failed", ()))
+    runs = sum(map(len, data.runs))
+    seconds = sum(run.wall_s for of_it in data.runs for run in of_it)
+    designs = f"{len(data):,}" + (f", {failed:,} of them failed" if failed else "")
+    last = (data.logbook.get("gen") or [0])[-1]
+    return (
+        f"Designs: {designs}. Runs: {runs:,}, {_duration(seconds)} of wall time. Generations: {last} after the "
+        f"first. Method: {data.settings.get('method')}, seed {data.settings.get('seed')}."
+    )
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in a unit that people read."""
+    for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def _versions(data: SearchData) -> str:
+    evaluator = data.identity.get("evaluator", {})
+    told = [f"{name} {value}" for name, value in evaluator.items()]
+    return f"Run by tisim {data.versions.get('tisim', 'of another version')}{', ' if told else ''}{', '.join(told)}."
+
+
+def _sections(data: SearchData, clouds: bool, several: bool) -> Iterable[Section]:
+    if clouds:
+        yield Section("clouds", "Start and end", '<div id="views"></div>')
+    yield Section("convergence-section", "Convergence", '<div id="convergence" class="figures"></div>')
+    if several:
+        yield Section("front", "Front", '<div id="fronts" class="figures"></div>')
+    yield Section(
+        "genes",
+        "Genes",
+        '<div id="colours" class="group" role="group" aria-label="Colours"></div><div id="parallel"></div>'
+        '<h3>Pairs of genes</h3><fieldset id="pair-choice" class="group range"></fieldset>'
+        '<div id="pairs" class="pairs"></div>',
+    )
+    yield Section("designs", "Designs", '<div id="rows"></div>')
+    yield Section("asked", "What was asked", _asked(data))
+
+
+def _asked(data: SearchData) -> str:
+    """Return the genes, objectives, constraints and settings of a search as HTML."""
+
+    def bounds(row: Row) -> str:
+        if "choices" in row:
+            return str(row["choices"])
+        if "low" in row:
+            return f"{row['low']:.6g} to {row['high']:.6g}" + (", logarithmic" * (row.get("scale") == "log"))
+        return f"fixed at {row['value']}" if "value" in row else "follows from the others"
+
+    def limits(row: Row) -> str:
+        words = {"at_least": "at least", "at_most": "at most"}
+        return ", ".join(f"{word} {row[name]:.6g}" for name, word in words.items() if name in row)
+
+    text = "<h3>Genes</h3>" + table(
+        ("gene", "unit", "range"), [(row["name"], row.get("unit", ""), bounds(row)) for row in data.genes], "genes"
+    )
+    text += "<h3>Objectives</h3>" + table(
+        ("objective", "unit", "wanted", "over the starts", "meaning"),
+        [
+            (row["name"], row.get("unit", ""), row["direction"], row["statistic"], row.get("description", ""))
+            for row in data.objectives
+        ],
+        "objectives",
+    )
+    if data.constraints:
+        text += "<h3>Constraints</h3>" + table(
+            ("constraint", "unit", "bounds", "of"),
+            [(row["name"], row.get("unit", ""), limits(row), row.get("of", "")) for row in data.constraints],
+            "constraints",
+        )
+    text += "<h3>Settings of the search</h3>" + table(
+        ("setting", "value"), [(name, str(value)) for name, value in _leaves(data.settings)], "settings"
+    )
+    if data.command:
+        text += "<h3>Command</h3>" + copied_text("command", shlex.join(["tisim", *data.command]) + "\n")
+    return text
+
+
+def _leaves(settings: Mapping[str, Any], above: str = "") -> Iterable[tuple[str, Any]]:
+    """Yield nested settings by their dotted names, without those that are not given."""
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{above}{name}.")
+        elif value is not None:
+            yield f"{above}{name}", value

@@ -1,0 +1,27 @@
+/* The page of a run: decodes the recording, and connects the viewer, the curves and the tables. */
+
+async function start() {
+  const facts = json("facts"), place = document.getElementById("viewer");
+  tables();
+  try {
+    Object.assign(report, await decodeRun(facts, fromBase64(document.getElementById("recording").textContent)));
+    report.player = new Player(place, report.trajectory, facts.scene, report.network, facts);
+  } catch (error) {
+    place.replaceChildren(element("p", { class: "warning", role: "alert" }, `The particles cannot be shown: ${error.message}`));
+  }
+  place.classList.remove("waiting");
+  const jump = (time) => {
+    if (!report.player) return;
+    report.player.play(false);
+    const times = report.trajectory.times;
+    report.player.go(times.reduce((best, t, k) => (Math.abs(t - time) < Math.abs(times[best] - time) ? k : best), 0));
+  };
+  const curves = document.getElementById("curves"), name = facts.name.replace(/[^\w.-]+/g, "_");
+  report.charts = facts.series.curves.map((one) => new Chart(curves, one, facts.series.times, jump, name));
+  report.player?.listeners.push((frame) => { for (const chart of report.charts) chart.at(report.trajectory.times[frame]); });
+  themes((dark) => report.player?.theme(dark));
+  report.player?.go(0);
+  document.documentElement.dataset.ready = "yes";
+}
+
+start();
