@@ -31,7 +31,7 @@ ROOMS = (
     "tisim.self_consistent", "tisim.population", "tisim.sources",
     "tisim.effects", "tisim.operators", "tisim.steppers", "tisim.scene",
     "tisim.engine", "tisim.describe", "tisim.testing", "tisim.io", "tisim.analysis",
-    "tisim.rendering", "tisim.plotting", "tisim", "tisim.accuracy", "tisim.reading", "tisim.report",
+    "tisim.rendering", "tisim.plotting", "tisim", "tisim.accuracy", "tisim.reading", "tisim.report", "tisim.watch",
     "tisim.optimize.problem", "tisim.optimize.storage", "tisim.optimize.evaluation",
     "tisim.optimize.methods.individual", "tisim.optimize.surrogate", "tisim.optimize.methods",
     "tisim.optimize.fitness_record", "tisim.optimize.hall_of_fame",

@@ -67,7 +67,7 @@ def run_report(
     """
     chosen, path, reserved = options or ReportOptions(), Path(to), RESERVED_BYTES
     with frames(file, world) as sequence:
-        kept, result = KeptFrames(sequence), _result(Path(file), sequence.scene)
+        kept, result = KeptFrames(sequence), result_of(Path(file), sequence.scene)
         for _ in range(SIZE_ATTEMPTS):
             page = run_page(kept, chosen, result, reserved)
             content = page.html().encode()
@@ -95,17 +95,14 @@ def run_page(
     series = time_series.history(cast(Frames, sequence))
     times, panels = tables.time_series(series, scene, sequence.measures)
     data = viewer_data(sequence, options, reserved)
-    state, verdict, sentences = _status(sequence, result)
+    state, verdict, sentences = status_of(sequence.missing, result)
     first, last = sequence[0].arrays, sequence[-1].arrays
     ends = len(first["mass"]), len(last["mass"])
-    frames_shown = len(data.trajectory.times)
-    shown = f"{frames_shown} of {count}" if frames_shown < count else f"{count}"
-    number = f"{ends[0]:,}" if ends[0] == ends[1] else f"{ends[0]:,} at the start, {ends[1]:,} at the end"
     return Page(
         title=scene.name,
         state=state,
         verdict=verdict,
-        summary=f"Particles: {number}. Frames: {shown}, from t = {times[0]:.6g} s to {times[-1]:.6g} s.",
+        summary=summary(ends, len(data.trajectory.times), count, (times[0], times[-1])),
         facts=data.facts | {"series": {"times": tables.digits(times), "curves": panels}},
         recording=data.recording,
         notices=[*sentences, *data.notices],
@@ -114,7 +111,7 @@ def run_page(
     )
 
 
-def _result(file: Path, scene: Scene) -> Result | None:
+def result_of(file: Path, scene: Scene) -> Result | None:
     """Return the result of the run, if it has ended."""
     path = file if file.name == "result.h5" else file.with_name("result.h5")
     if not regular_file.exists(path):
@@ -127,42 +124,30 @@ def _result(file: Path, scene: Scene) -> Result | None:
     return result if same else None
 
 
-def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list[str]]:
-    """Return the state, a word for it, and sentences about it."""
+def status_of(missing: str, result: Result | None) -> tuple[str, str, list[str]]:
+    """Return the state of a run, a word for it, and sentences about it. missing : see ``Frames.missing``."""
     if result is None:
-        reached = sequence.missing
         return (
-            ("unfinished", "unfinished", [f"{reached[0].upper()}{reached[1:]}."])
-            if reached
+            ("unfinished", "unfinished", [f"{missing[0].upper()}{missing[1:]}."])
+            if missing
             else ("ok", "complete", [])
         )
     status = result.status
     return ("ok", "ok", []) if status.ok else ("failed", "failed", [f"The run failed {status.reason}."])
 
 
+def summary(ends: tuple[int, int], shown: int, count: int, times: tuple[float, float]) -> str:
+    """Return a sentence about the numbers of particles at both ends, of frames, and their times (s)."""
+    number = f"{ends[0]:,}" if ends[0] == ends[1] else f"{ends[0]:,} at the start, {ends[1]:,} at the end"
+    frames_shown = f"{shown} of {count}" if shown < count else f"{count}"
+    return f"Particles: {number}. Frames: {frames_shown}, from t = {times[0]:.6g} s to {times[1]:.6g} s."
+
+
 def _sections(
     scene: Scene, result: Result | None, states: tuple[Arrays, Arrays], options: ReportOptions
 ) -> list[Section]:
     """Return the sections below the view."""
-    happened = '<div id="curves"></div>\n<h3>Balances</h3>' + table(
-        ("quantity", "unit", "start", "end", "change"),
-        [
-            (name, unit, f"{start:.10g}", f"{end:.10g}", f"{end - start:.3g}")
-            for name, unit, start, end in tables.balances(*states)
-        ],
-        "balances",
-        (2, 3, 4),
-    )
-    if result is not None and (result.work or result.measures):
-        happened += "<h3>Counts and measures at the end</h3>" + table(
-            ("quantity", "value"),
-            [
-                *((name.replace("_", " "), f"{number}") for name, number in result.work.items()),
-                *((name.replace("_", " "), f"{value:.8g}") for name, value in result.measures.items()),
-            ],
-            "counts",
-            (1,),
-        )
+    happened = f'<div id="curves"></div>\n<div id="numbers">{numbers(result, states)}</div>'
     sections = [
         Section("happened", "What happened", happened),
         Section("asked", "What was asked", _asked(scene)),
@@ -174,6 +159,30 @@ def _sections(
         shown = "\n".join(picture(title, png) for title, png in options.pictures.items())
         sections.append(Section("pictures", "Pictures", f'<div class="pictures">{shown}</div>'))
     return sections
+
+
+def numbers(result: Result | None, states: tuple[Arrays, Arrays]) -> str:
+    """Return the balances between two states, and the counts and measures of a run, as HTML."""
+    html = "<h3>Balances</h3>" + table(
+        ("quantity", "unit", "start", "end", "change"),
+        [
+            (name, unit, f"{start:.10g}", f"{end:.10g}", f"{end - start:.3g}")
+            for name, unit, start, end in tables.balances(*states)
+        ],
+        "balances",
+        (2, 3, 4),
+    )
+    if result is not None and (result.work or result.measures):
+        html += "<h3>Counts and measures at the end</h3>" + table(
+            ("quantity", "value"),
+            [
+                *((name.replace("_", " "), f"{number}") for name, number in result.work.items()),
+                *((name.replace("_", " "), f"{value:.8g}") for name, value in result.measures.items()),
+            ],
+            "counts",
+            (1,),
+        )
+    return html
 
 
 def _asked(scene: Scene) -> str:

@@ -1,0 +1,247 @@
+"""The page of a run that is watched, and the frames that are new since a browser has last asked.
+
+A trajectory can be read while it grows (see io/trajectory.py). Of a run without one, the page waits for the
+result. After the first page, reading and compressing take at most a share of one core (see budget.py): if
+frames come faster, only some of them are shown, the last one included. Once the run has ended, the browser
+asks for all.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from tisim.engine.result import Result
+from tisim.errors import InputError, RunError
+from tisim.files import regular_file
+from tisim.io.reader import Frame, Frames, frames
+from tisim.plotting import time_series
+from tisim.report import tables
+from tisim.report.compressed_trajectory import compress
+from tisim.report.contact_network import contact_network, has_contacts
+from tisim.report.kept_frames import KeptFrames
+from tisim.report.page import COMMON_SCRIPTS, WATCH_SCRIPTS, Page, text_data
+from tisim.report.run_report import RESERVED_BYTES, numbers, result_of, run_page, status_of, summary
+from tisim.report.viewer_data import ReportOptions, player_facts
+from tisim.scene.scene import Scene
+from tisim.watch.budget import Budget
+from tisim.watch.server import Answer, Answers
+
+POLL = 2.0
+"""Time between two requests of a browser, s."""
+UPDATE_SECONDS = 0.05
+"""Processor time of an update that is aimed at, s; it always has one frame."""
+FIRST_RATE = 1e-6
+"""Processor time for a particle in a frame, assumed before it is measured, s."""
+UNREADABLE = (InputError, RunError, OSError)
+"""Errors of files that change, or are damaged."""
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """A file of a run. inode : of the file. first : its first frame."""
+
+    inode: int
+    scene: Scene
+    key: str
+    first: Frame
+
+
+class _Some:
+    """Some frames of a run, in memory: the first, and new ones."""
+
+    def __init__(self, scene: Scene, frames: Sequence[Frame]) -> None:
+        self.scene, self._frames = scene, frames
+        self.times = np.array([frame.time for frame in frames])
+        names = frames[0].measures
+        self.measures = {name: np.array([frame.measures[name] for frame in frames]) for name in names}
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, k: int) -> Frame:
+        return self._frames[k]
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(self._frames)
+
+
+class WatchedRun:
+    """The folder of a run that is watched, or one of its files.
+
+    Its ``answers`` are for a ``WatchServer``. An unreadable file gives the last good state, and the reason.
+    """
+
+    def __init__(
+        self, path: Path, world: int = 0, options: ReportOptions | None = None, budget: Budget | None = None
+    ) -> None:
+        """world : index in a batch. options : of the page."""
+        self._path, self._world = path, world
+        self._options, self._budget = options or ReportOptions(), budget or Budget()
+        self._lock = threading.Lock()
+        self._opened: _Opened | None = None
+        self._result: tuple[Any, Result | None] = (None, None)
+        self._rate = FIRST_RATE
+
+    @property
+    def answers(self) -> Answers:
+        """Return the functions that answer requests: for the page, and for news since a frame."""
+        return {
+            "": lambda query: Answer(self.page().encode(), "text/html"),
+            "news": lambda query: Answer(json.dumps(self.news(query)).encode(), "application/json"),
+        }
+
+    def page(self) -> str:
+        """Return the page with all frames that exist, thinned to the limit; or one that waits for them."""
+        with self._lock, self._budget.spend():
+            try:
+                file = self._file()
+                if file is None:
+                    return self._waiting("There is no frame yet.")
+                with frames(file, self._world) as sequence:
+                    if not len(sequence):
+                        return self._waiting("There is no frame yet.")
+                    opened = self._open(file, sequence)
+                    result = self._ended(file, opened.scene)
+                    page = run_page(KeptFrames(sequence), self._options, result)
+            except UNREADABLE as failure:
+                return self._waiting(f"The run cannot be read at this moment: {failure}.")
+        live = self._state(file, result) | {
+            "key": opened.key, "after": len(sequence) - 1, "poll": POLL, "all": len(sequence),
+        }  # fmt: skip
+        verdict = page.verdict if live["ended"] else "running"
+        return replace(
+            page, verdict=verdict, facts=page.facts | {"live": live}, scripts=WATCH_SCRIPTS, connects=True
+        ).html()
+
+    def news(self, query: Mapping[str, str]) -> dict[str, Any]:
+        """Return the changes since a frame, as plain data.
+
+        query : ``key`` of the run; ``after``, the index of the last frame that the browser knows, -1 to read
+            all frames again.
+        """
+        with self._lock:
+            try:
+                return self._news(query.get("key", ""), int(query.get("after", "-1")))
+            except UNREADABLE as failure:
+                return {"problem": str(failure)}
+            except ValueError:
+                return {"reload": True}
+
+    def _news(self, key: str, after: int) -> dict[str, Any]:
+        file = self._file()
+        if file is None:
+            return {"waiting": True}
+        state = self._state(file, self._result[1])
+        seen = self._opened is not None and self._opened.key == key
+        wait = self._budget.wait()
+        if wait and not (state["ended"] and after < 0):
+            return state | {"wait": wait}
+        with self._budget.spend(), frames(file, self._world) as sequence:
+            count = len(sequence)
+            if not count:
+                return {"waiting": True}
+            opened = self._open(file, sequence)
+            if not seen or opened.key != key or after >= count:
+                return {"reload": True}
+            result = self._ended(file, opened.scene)
+            state = self._state(file, result)
+            if after == count - 1:
+                return state | {"after": after}
+            return state | self._update(sequence, opened, result, after)
+
+    def _update(self, sequence: Frames, opened: _Opened, result: Result | None, after: int) -> dict[str, Any]:
+        """Return the frames after one as plain data."""
+        count, particles = len(sequence), max(len(opened.first.arrays["id"]), 1)
+        if after < 0:
+            kept = KeptFrames(sequence)
+            page = run_page(kept, self._options, result, RESERVED_BYTES)
+            ends, shown, chosen = (kept[0], kept[-1]), len(page.facts["trajectory"]["times"]), []
+            facts, recording = page.facts, page.recording
+        else:
+            most = max(1, int(UPDATE_SECONDS / (self._rate * particles)))
+            stride = -(-(count - 1 - after) // most)
+            chosen = list(range(count - 1, after, -stride))[::-1]
+            began = time.process_time()
+            new = [sequence[k] for k in chosen]
+            facts, recording = self._part(opened, new, chosen)
+            self._rate = (time.process_time() - began) / sum(len(one.arrays["id"]) + 1 for one in new)
+            ends, shown = (opened.first, new[-1]), len(chosen)
+        first, last = (frame.arrays for frame in ends)
+        _, verdict, sentences = status_of(sequence.missing, result)
+        span = float(ends[0].time), float(ends[1].time)
+        return {
+            "facts": facts, "recording": text_data(recording), "after": count - 1, "shown": shown,
+            "all": count, "notices": sentences, "verdict": verdict if result else "running",
+            "numbers": numbers(result, (first, last)),
+            "summary": summary((len(first["mass"]), len(last["mass"])), count, count, span),
+        }  # fmt: skip
+
+    def _part(
+        self, opened: _Opened, new: Sequence[Frame], chosen: Sequence[int]
+    ) -> tuple[dict[str, Any], bytes]:
+        """Return new frames as a part of a recording, with the points of the curves."""
+        some = _Some(opened.scene, [opened.first, *new])
+        trajectory = compress(some, range(1, len(some)), 1, self._options.fields)
+        contacts = self._options.contacts and has_contacts(opened.scene)
+        network = contact_network(some, trajectory) if contacts else None
+        facts, recording = player_facts(some, trajectory, network)
+        facts["trajectory"] = {**trajectory.facts(), "indices": list(chosen)}
+        series = time_series.history(cast(Frames, some))
+        times, panels = tables.time_series(series, opened.scene, some.measures, number=True)
+        for panel in cast(list[dict[str, Any]], panels):
+            for curve in panel["curves"]:
+                curve["values"] = curve["values"][1:]
+        return facts | {"series": {"times": tables.digits(times[1:]), "curves": panels}}, recording
+
+    def _file(self) -> Path | None:
+        """Return the trajectory, or else the result; None if there is neither."""
+        if not regular_file.is_folder(self._path):
+            return self._path if regular_file.exists(self._path) else None
+        found = (self._path / name for name in ("trajectory.h5", "result.h5"))
+        return next((file for file in found if regular_file.exists(file)), None)
+
+    def _open(self, file: Path, sequence: Frames) -> _Opened:
+        """Return the scene and the first frame of an open file, which are read once."""
+        inode = file.stat().st_ino
+        if self._opened is None or self._opened.inode != inode:
+            scene = sequence.scene
+            self._opened = _Opened(inode, scene, scene.digest()[:32], sequence[0])
+        else:
+            # Reading the scene again would take longer than a frame.
+            sequence.scene = self._opened.scene
+        return self._opened
+
+    def _ended(self, file: Path, scene: Scene) -> Result | None:
+        """Return the result of the run if it has ended; it is read once."""
+        path = file.with_name("result.h5")
+        status = regular_file.file_status(path)
+        mark = None if status is None else (status.st_ino, status.st_size, status.st_mtime_ns)
+        if mark != self._result[0]:
+            self._result = mark, result_of(path, scene) if mark else None
+        return self._result[1]
+
+    def _state(self, file: Path, result: Result | None) -> dict[str, Any]:
+        """Return whether the run has ended, and the time since the last change of the file, s."""
+        return {"ended": result is not None, "age": max(0.0, time.time() - file.stat().st_mtime)}
+
+    def _waiting(self, why: str) -> str:
+        """Return a page that asks until there is a run to show."""
+        return Page(
+            title=self._path.name or str(self._path),
+            state="unfinished",
+            verdict="waiting",
+            summary=why,
+            facts={"live": {"waiting": True, "poll": POLL}},
+            recording=b"",
+            scripts=(*COMMON_SCRIPTS, "watch.js"),
+            view="",
+            connects=True,
+        ).html()
