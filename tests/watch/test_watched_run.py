@@ -139,15 +139,14 @@ def test_the_budget_delays_news(growing, tmp_path, clock):
     run.write()
     key = facts_of(watched.page())["live"]["key"]
     run.write()
-    clock.now = 10.0
-    with watched._budget.spend():
-        clock.used += 0.2
-    assert watched._budget.wait() == pytest.approx(20.0)
+    clock.now, clock.used = 10.0, 0.2
     clock.now = 29.0
+    assert watched._budget.wait() == pytest.approx(20.0)
+    clock.now = 48.0
     news = watched.news({"key": key, "after": "0"})
     assert news["wait"] == pytest.approx(1.0)
     assert "facts" not in news
-    clock.now = 30.1
+    clock.now = 49.1
     assert_frames(watched.news({"key": key, "after": "0"}), run, [1])
 
 

@@ -100,7 +100,7 @@ class WatchedRun:
 
     def page(self) -> str:
         """Return the page with all frames that exist, thinned to the limit; or one that waits for them."""
-        with self._lock, self._budget.spend():
+        with self._lock, self._budget.exempt():
             try:
                 file = self._file()
                 if file is None:
@@ -144,7 +144,7 @@ class WatchedRun:
         wait = self._budget.wait()
         if wait and not (state["ended"] and after < 0):
             return state | {"wait": wait}
-        with self._budget.spend(), frames(file, self._world) as sequence:
+        with frames(file, self._world) as sequence:
             count = len(sequence)
             if not count:
                 return {"waiting": True}
