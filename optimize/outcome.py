@@ -104,6 +104,8 @@ class Outcome(ShownInNotebook):
         quantities).
     failures : estimates of each failed design, with the reason.
     limits : estimates of the constraints of the result, of each design.
+    held_out : estimates of the objectives and of the constraints of the result from held-out starts, of each
+        design that has them.
     generations : the generation in which each design was first estimated, in order.
     logbook : one row for each finished generation: gen, designs (newly estimated), starts (evaluations
         requested), failed, box (mean width of the search box it drew from), recentred (box moved after it),
@@ -126,6 +128,9 @@ class Outcome(ShownInNotebook):
     quantities: dict[tuple[float, ...], NDArray[np.float64]] = field(default_factory=dict)
     failures: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
     limits: dict[tuple[float, ...], tuple[FitnessEstimate, ...]] = field(default_factory=dict)
+    held_out: dict[tuple[float, ...], tuple[tuple[FitnessEstimate, ...], tuple[FitnessEstimate, ...]]] = (
+        field(default_factory=dict)
+    )
     generations: dict[tuple[float, ...], int] = field(default_factory=dict)
     logbook: tools.Logbook = field(default_factory=tools.Logbook)
     evaluations: int = 0

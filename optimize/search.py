@@ -315,4 +315,9 @@ class _Search:
         out.evaluations, out.hits = self.ensemble.runs.evaluations, self.ensemble.runs.hits
         out.elapsed_s = time.monotonic() - self.began
         out.limits = {one: individual.limits for one, individual in self.known.items()}
+        out.held_out = {
+            point: (individual.confirmed, individual.confirmed_limits)
+            for point, individual in self.known.items()
+            if individual.confirmed
+        }
         store(self.cache, out)

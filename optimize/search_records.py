@@ -22,8 +22,8 @@ from tisim.optimize.tables import attributes, best_columns, logbook_columns, sea
 WARM_START = "warm_start"
 """Name of the table of the known designs of a warm start; its checksum has this key in an identity."""
 DESIGNS_TABLE, COMMAND_TABLE = "designs", "command"
-"""Names of the tables, below a search, of its designs (with ``genes`` and ``values`` below), and of the words of
-the command that began it."""
+"""Names of the tables, below a search, of its designs (with ``genes`` and ``values`` below), and of the words
+of the command that began it."""
 
 
 def store(cache: Cache, outcome: Outcome) -> None:
@@ -54,8 +54,8 @@ def store(cache: Cache, outcome: Outcome) -> None:
         about = {heading: one for heading, one in attributes(problem).items() if heading in columns}
         cache.put_table(f"{name}/{below}", columns, about=about)
     designs = searched_designs(
-        problem, outcome.generations, {**outcome.estimates, **outcome.failures}, outcome.limits, outcome.hall,
-        outcome.best,
+        problem, outcome.generations, {**outcome.estimates, **outcome.failures}, outcome.limits,
+        outcome.held_out, outcome.hall, outcome.best,
     )  # fmt: skip
     for below, columns in (("", designs.facts), ("/genes", designs.genes), ("/values", designs.values)):
         cache.put_table(f"{name}/{DESIGNS_TABLE}{below}", columns)

@@ -24,7 +24,7 @@ Estimates = Mapping[tuple[float, ...], tuple[FitnessEstimate, ...]]
 """Estimates of designs, by their points of the unit cube."""
 FEASIBLE = "feasible"
 """Heading of the column that says whether a design satisfies the constraints of the result."""
-UNKNOWN = FitnessEstimate(math.nan, math.nan, math.nan, math.nan, 0, False)
+NOT_KNOWN = FitnessEstimate(math.nan, math.nan, math.nan, math.nan, 0, False)
 """The estimate of a value that is not known."""
 
 
@@ -179,31 +179,34 @@ def searched_designs(
     generations: Mapping[tuple[float, ...], int],
     estimates: Estimates,
     limits: Estimates,
+    held_out: Mapping[tuple[float, ...], tuple[Sequence[FitnessEstimate], Sequence[FitnessEstimate]]],
     hall: Sequence[Individual],
     best: Individual | None,
 ) -> SearchedDesigns:
     """Return all designs of a search.
 
     generations : generation of the first estimation of each design, in order. estimates : of the objectives,
-        failed designs included. limits : of the constraints of the result. best : of the hall.
+        failed designs included. limits : of the constraints of the result.
+    held_out : both from held-out starts. best : of the hall.
     """
     members = {tuple(individual): (rank, individual) for rank, individual in enumerate(hall, start=1)}
     found = [members.get(point, (0, None)) for point in generations]
     designs = [problem.genome.decode(point) for point in generations]
     of_all, constraints = [estimates[point] for point in generations], problem.result_constraints
+    nothing = (NOT_KNOWN,) * len(constraints)
     limited = [
-        (limits.get(point) or (UNKNOWN,) * len(constraints)) if known[0].ok else (UNKNOWN,) * len(constraints)
+        (limits.get(point) or nothing) if known[0].ok else nothing
         for point, known in zip(generations, of_all, strict=True)
     ]
-    again = [() if one is None else one.confirmed for _, one in found]
-    again_limited = [() if one is None else one.confirmed_limits for _, one in found]
+    again = [held_out.get(point, ((), ()))[0] for point in generations]
+    again_limited = [held_out.get(point, ((), ()))[1] for point in generations]
     values: dict[str, list[float]] = {}
 
-    def add(k: int, name: str, sign: float, mine: Sequence[Any], held_out: Sequence[Any]) -> None:
+    def add(k: int, name: str, sign: float, mine: Sequence[Any], fresh: Sequence[Any]) -> None:
         values[name] = [sign * one[k].mean if one[k].ok else math.nan for one in mine]
         values[error_of(name)] = [one[k].standard_error for one in mine]
-        if any(held_out):
-            known = [one[k] if one else UNKNOWN for one in held_out]
+        if any(fresh):
+            known = [one[k] if one else NOT_KNOWN for one in fresh]
             ends = [sorted((sign * one.low, sign * one.high)) for one in known]
             values[f"{name}{FRESH_STARTS}"] = [sign * one.mean for one in known]
             values[f"{name} {LOW}{FRESH_STARTS}"] = [low for low, _ in ends]

@@ -20,7 +20,7 @@ from tisim.optimize.settings import Settings, identity
 from tisim.report.kept_frames import KeptFrames
 from tisim.report.viewer_data import ReportOptions, player_facts, recording
 
-FRAMES = 40
+RECORDED_FRAMES = 40
 """Number of frames of a recorded design after its start."""
 PARTICLES_SHARE = 0.8
 """Part of the size of a page that recorded designs may take."""
@@ -77,7 +77,8 @@ def record(
 ) -> list[RecordedDesign]:
     """Run designs from their first start, and return their recordings.
 
-    limit : size of the page, MB; frames are left out to keep it. progress : called with the finished fraction.
+    limit : size of the page, MB; frames are left out to keep it.
+    progress : called with the finished fraction.
 
     InputError for a problem that is a plain function, which has no particles.
     """
@@ -88,7 +89,7 @@ def record(
     found = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "designs.h5"
-        results = tisim.run(list(of_designs.values()), progress, Recording(path, frames=FRAMES))
+        results = tisim.run(list(of_designs.values()), progress, Recording(path, frames=RECORDED_FRAMES))
         options = ReportOptions(max(0.5, PARTICLES_SHARE * limit / len(designs)))
         for world, (k, result) in enumerate(zip(of_designs, results, strict=True)):
             with frames(path, world) as sequence:
@@ -96,7 +97,9 @@ def record(
                 trajectory, network, notices = recording(kept, options, 0.0)
                 facts, content = player_facts(kept, trajectory, network)
             count = len(trajectory.times)
-            about = [f"A run of its first start for this page: {count} frames to t = {trajectory.times[-1]:.4g} s."]
+            about = [
+                f"Run from its first start for this page: {count} frames to t = {trajectory.times[-1]:.4g} s."
+            ]
             if not result.status.ok:
                 about.append(f"It failed {result.status.reason}.")
             found.append(RecordedDesign(k, " ".join([*about, *notices]), facts, content))

@@ -50,8 +50,8 @@ class RunOfDesign:
 class SearchData:
     """A search.
 
-    name : in the file. problem, title : name and title of its problem. stopped : the rule that ended it; "" if
-    it has not ended. settings : of the search. identity : see optimize.settings.
+    name : in the file. problem, title : name and title of its problem.
+    stopped : the rule that ended it; "" if it has not ended. identity : see optimize.settings.
     command : words of the command that began it; empty if it was begun in Python.
     genes, objectives, constraints : a row for each, see optimize.search_records.
     logbook : columns by heading. facts, design_genes, values : see ``tables.SearchedDesigns``.

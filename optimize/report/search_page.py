@@ -19,16 +19,15 @@ from tisim.files.atomic import replace_file
 from tisim.optimize.report.recorded_designs import RecordedDesign
 from tisim.optimize.report.search_data import Row, RunOfDesign, SearchData, number_or_none, read_search
 from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW, error_of
+from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.page import SEARCH_SCRIPTS, Page, Section, copied_text, table
 from tisim.report.scenery import colour_maps
 from tisim.report.viewer_data import SIZE_LIMIT
 from tisim.version import __version__
 
-WIDE_RANGE = 100.0
-"""Values that are positive and spread over more than this factor are drawn on a logarithmic axis."""
-VIEW = (
-    '<aside id="design" aria-label="Chosen design" aria-live="polite"></aside>'
-    '<a id="shown" href="#design" aria-label="To the chosen design"></a>'
+CHOSEN_DESIGN = (
+    '<aside id="chosen" aria-label="Chosen design" aria-live="polite"></aside>'
+    '<a id="shown" href="#chosen" aria-label="To the chosen design"></a>'
 )
 """The places of the panel of the chosen design, and of its short form on narrow pages."""
 
@@ -94,15 +93,14 @@ def search_page(data: SearchData, options: SearchPageOptions, kept: Sequence[int
     scenes = {kept.index(k): toml for k, toml in _scenes(data, options).items() if k in kept}
     facts = {
         "name": data.name, "several": several, "generations": list(data.logbook.get("gen", ())),
-        "convergence": list(convergence(data)), "designs": designs_facts(data, kept),
-        "quantities": _quantities(data), "maps": colour_maps(), "recordings": recordings,
-        "scenes": scenes, "command": shlex.join(["tisim", *data.command]) if data.command else "",
+        "convergence": list(convergence(data)), "progress": list(progress(data)),
+        "designs": designs_facts(data, kept), "quantities": _quantities(data), "maps": colour_maps(),
+        "recordings": recordings, "scenes": scenes, "command": _command(data),
     }  # fmt: skip
     notices = list(_notices(data))
     if len(kept) < len(data):
-        notices.append(
-            f"To keep this file below {options.limit:g} MB, it has the best {len(kept)} of {len(data)} designs."
-        )
+        some = f"the best {len(kept)} of {len(data)} designs"
+        notices.append(f"To keep this file below {options.limit:g} MB, it has {some}.")
     ended = {"": "not ended", "interrupted": "interrupted", "target": "target reached"}
     return Page(
         title=data.title,
@@ -115,7 +113,7 @@ def search_page(data: SearchData, options: SearchPageOptions, kept: Sequence[int
         sections=list(_sections(data, bool(recordings), several)),
         footer=[f"Search {data.name}. {_versions(data)} Written by tisim {__version__}."],
         scripts=SEARCH_SCRIPTS,
-        view=VIEW,
+        view=CHOSEN_DESIGN,
     )
 
 
@@ -137,7 +135,7 @@ def designs_facts(data: SearchData, kept: Sequence[int]) -> dict[str, Any]:
         columns["errors"] = columns["errors"] or [None for _ in kept]
         return {
             "name": name, "unit": row.get("unit", ""), "largest": row.get("direction") == "largest",
-            "logarithmic": _spread(known), "values": [number_or_none(value) for value in of(known)], **columns,
+            "logarithmic": _spread(known), "values": list(map(number_or_none, of(known))), **columns,
         }  # fmt: skip
 
     fresh, quantities = data.facts.get(f"starts{FRESH_STARTS}", ()), _quantities(data)
@@ -187,7 +185,7 @@ def _spread(values: Sequence[float]) -> bool:
 
 
 def _best(data: SearchData, kept: Sequence[int], count: int) -> list[int]:
-    """Return the best of designs: those of the hall of fame, and those with the best value of an objective."""
+    """Return the best of designs: the hall of fame, and designs with the best values of an objective."""
     order = {k: (0 if data.facts["rank"][k] else 1, math.inf) for k in kept}
     for row in data.objectives:
         sign = -1.0 if row.get("direction") == "largest" else 1.0
@@ -199,55 +197,48 @@ def _best(data: SearchData, kept: Sequence[int], count: int) -> list[int]:
 
 
 def convergence(data: SearchData) -> Iterable[dict[str, Any]]:
-    """Yield the panels of curves by generation: the best and the mean fitness, or the best value of each of
-    several objectives; then the derived values, the starts, the failed designs and the search box."""
+    """Yield the panels of the best values by generation; for one objective also the mean of the population
+    with its standard deviation, and the derived values."""
     log = data.logbook
-    if not log or not log.get("gen"):
+    if not log.get("gen"):
         return
-
-    def numbers(heading: str) -> list[float | None]:
-        return [number_or_none(value) for value in log[heading]]
-
-    def panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
-        every = [value for one in curves for value in one["values"] if value is not None]
-        wide = _spread(every)
-        return {"title": title, "unit": unit, "logarithmic": wide, "curves": curves, "marks": list(marks)}
-
     marks = list(_held_out_best(data))
-    if len(data.objectives) == 1:
-        (objective,) = data.objectives
-        mean, std = log["mean"], log["std"]
-        ends = [(m - s, m + s) for m, s in zip(mean, std, strict=True)]
-        yield panel(
-            f"{objective['name']}: best, and mean and standard deviation of the population",
-            objective.get("unit", ""),
-            [
-                {"label": "best", "values": numbers("best")},
-                {
-                    "label": "mean", "values": numbers("mean"),
-                    "low": [number_or_none(low) for low, _ in ends],
-                    "high": [number_or_none(high) for _, high in ends],
-                },
-            ],
-            marks,
-        )  # fmt: skip
-    unit_of = {row["name"]: row.get("unit", "") for row in data.objectives}
-    own = {"gen", "best", "mean", "std", "recentred"}
+    if len(data.objectives) > 1:
+        for row in data.objectives:
+            for heading in (one for one in log if one.startswith(f"best {row['name']}")):
+                yield _panel(f"best {row['name']}", row.get("unit", ""), [_curve("", log[heading])])
+        return
+    (objective,) = data.objectives
+    ends = [(m - s, m + s) for m, s in zip(log["mean"], log["std"], strict=True)]
+    mean = _curve("mean", log["mean"])
+    mean["low"], mean["high"] = ([number_or_none(end) for end in side] for side in zip(*ends, strict=True))
+    title = f"{objective['name']}: best, and mean and standard deviation of the population"
+    yield _panel(title, objective.get("unit", ""), [_curve("best", log["best"]), mean], marks)
+
+
+def progress(data: SearchData) -> Iterable[dict[str, Any]]:
+    """Yield the panels of all other numbers of a generation that change."""
     titles = {
-        "starts": "new runs of a generation", "designs": "new designs of a generation",
-        "failed": "failed designs of a generation", "box": "mean width of the search box",
-        "front": "designs in the front",
+        "starts": "new runs", "designs": "new designs", "failed": "failed designs",
+        "box": "mean width of the search box", "front": "designs in the front",
     }  # fmt: skip
-    for heading, values in log.items():
-        if heading in own or not all(isinstance(value, int | float) for value in values):
+    for heading, values in data.logbook.items():
+        known = heading in ("gen", "mean", "std", "recentred") or heading.split(" ")[0] == "best"
+        if known or not all(isinstance(value, int | float) for value in values):
             continue
-        known = {value for value in values if math.isfinite(value)}
-        name = next((one for one in unit_of if heading.startswith(f"best {one}")), None)
-        if name is not None:
-            mine = [mark for mark in marks if mark["name"] == name]
-            yield panel(heading, unit_of[name], [{"label": "", "values": numbers(heading)}], mine)
-        elif len(known) > 1:
-            yield panel(titles.get(heading, heading), "", [{"label": "", "values": numbers(heading)}])
+        if len({value for value in values if math.isfinite(value)}) > 1:
+            yield _panel(titles.get(heading, heading), "", [_curve("", values)])
+
+
+def _curve(label: str, values: Sequence[float]) -> dict[str, Any]:
+    return {"label": label, "values": [number_or_none(value) for value in values]}
+
+
+def _panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
+    every = [value for one in curves for value in one["values"] if value is not None]
+    return {
+        "title": title, "unit": unit, "logarithmic": _spread(every), "curves": curves, "marks": list(marks)
+    }  # fmt: skip
 
 
 def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
@@ -258,11 +249,13 @@ def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
     for row in data.objectives:
         name = row["name"]
         heads = (f"{name}{FRESH_STARTS}", f"{name} {LOW}{FRESH_STARTS}", f"{name} {HIGH}{FRESH_STARTS}")
-        value, low, high = (number_or_none(data.values[head][best]) if head in data.values else None for head in heads)
+        value, low, high = (
+            number_or_none(data.values[head][best]) if head in data.values else None for head in heads
+        )
         if value is not None:
             label = "best from fresh starts, 95 % interval"
             last = data.logbook["gen"][-1]
-            yield {"name": name, "x": last + 0.5, "value": value, "low": low, "high": high, "label": label}
+            yield {"x": last + 0.5, "value": value, "low": low, "high": high, "label": label}
 
 
 def _scenes(data: SearchData, options: SearchPageOptions) -> dict[int, str]:
@@ -294,10 +287,14 @@ def _summary(data: SearchData) -> str:
     seconds = sum(run.wall_s for of_it in data.runs for run in of_it)
     designs = f"{len(data):,}" + (f", {failed:,} of them failed" if failed else "")
     last = (data.logbook.get("gen") or [0])[-1]
-    return (
-        f"Designs: {designs}. Runs: {runs:,}, {_duration(seconds)} of wall time. Generations: {last} after the "
-        f"first. Method: {data.settings.get('method')}, seed {data.settings.get('seed')}."
-    )
+    method = f"Method: {data.settings.get('method')}, seed {data.settings.get('seed')}."
+    work = f"Runs: {runs:,}, {_duration(seconds)} of wall time. Generations: {last} after the first."
+    return f"Designs: {designs}. {work} {method}"
+
+
+def _command(data: SearchData) -> str:
+    """Return the command that began a search; "" if it was begun in Python."""
+    return shlex.join(["tisim", *data.command]) if data.command else ""
 
 
 def _duration(seconds: float) -> str:
@@ -310,14 +307,19 @@ def _duration(seconds: float) -> str:
 
 def _versions(data: SearchData) -> str:
     evaluator = data.identity.get("evaluator", {})
-    told = [f"{name} {value}" for name, value in evaluator.items()]
-    return f"Run by tisim {data.versions.get('tisim', 'of another version')}{', ' if told else ''}{', '.join(told)}."
+    told = [f"tisim {data.versions.get('tisim')}", *(f"{name} {value}" for name, value in evaluator.items())]
+    return f"Run by {', '.join(told)}."
 
 
 def _sections(data: SearchData, clouds: bool, several: bool) -> Iterable[Section]:
     if clouds:
         yield Section("clouds", "Start and end", '<div id="views"></div>')
-    yield Section("convergence-section", "Convergence", '<div id="convergence" class="figures"></div>')
+    yield Section(
+        "reached",
+        "Convergence",
+        '<div id="convergence" class="figures"></div><details class="block"><summary>Further numbers of each '
+        'generation</summary><div id="progress" class="figures"></div></details>',
+    )
     if several:
         yield Section("front", "Front", '<div id="fronts" class="figures"></div>')
     yield Section(
@@ -346,7 +348,9 @@ def _asked(data: SearchData) -> str:
         return ", ".join(f"{word} {row[name]:.6g}" for name, word in words.items() if name in row)
 
     text = "<h3>Genes</h3>" + table(
-        ("gene", "unit", "range"), [(row["name"], row.get("unit", ""), bounds(row)) for row in data.genes], "genes"
+        ("gene", "unit", "range"),
+        [(row["name"], row.get("unit", ""), bounds(row)) for row in data.genes],
+        "genes",
     )
     text += "<h3>Objectives</h3>" + table(
         ("objective", "unit", "wanted", "over the starts", "meaning"),
@@ -366,7 +370,7 @@ def _asked(data: SearchData) -> str:
         ("setting", "value"), [(name, str(value)) for name, value in _leaves(data.settings)], "settings"
     )
     if data.command:
-        text += "<h3>Command</h3>" + copied_text("command", shlex.join(["tisim", *data.command]) + "\n")
+        text += "<h3>Command</h3>" + copied_text("command.txt", f"{_command(data)}\n")
     return text
 
 

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from tests.report.conftest import SWITCHES
+from tests.browser import SWITCHES
 from tisim.effects import Granular, Gravity, HertzMaterial, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
 from tisim.io.reader import frames

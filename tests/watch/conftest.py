@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.report.conftest import browser, scene  # noqa: F401
+from tests.report.conftest import scene
 from tisim.engine.result import Result, Status
 from tisim.io.reader import Frame
 from tisim.io.run_folder import write_result

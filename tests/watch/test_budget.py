@@ -2,7 +2,7 @@
 
 import pytest
 
-from tisim.watch.budget import SHARE, Budget
+from tisim.watch.budget import CORE_SHARE, Budget
 
 
 @pytest.fixture
@@ -13,7 +13,7 @@ def budget(clock):
 def test_work_waits_until_it_is_a_share_of_the_time(budget, clock):
     assert budget.wait() == 0.0
     clock.used = 0.3
-    assert budget.wait() == pytest.approx(0.3 / SHARE)
+    assert budget.wait() == pytest.approx(0.3 / CORE_SHARE)
     clock.now = 20.0
     assert budget.wait() == pytest.approx(10.0)
     clock.now = 30.0
@@ -52,4 +52,4 @@ def test_over_a_long_time_the_share_is_kept(budget, clock):
             clock.used += 0.1
         clock.used += 0.0005
         clock.now += 2.0
-    assert 0.8 * SHARE < clock.used / clock.now <= SHARE
+    assert 0.8 * CORE_SHARE < clock.used / clock.now <= CORE_SHARE

@@ -8,7 +8,7 @@ from http import HTTPStatus
 import pytest
 
 from tisim import InputError
-from tisim.watch.server import HEADERS, LOOPBACK, Answer, WatchServer
+from tisim.watch.server import HEADERS, LOOPBACK, Reply, WatchServer
 
 SECRET = b"the page"
 
@@ -23,7 +23,7 @@ def asked():
 def server(asked):
     def page(query):
         asked.append(query)
-        return Answer(SECRET, "text/html")
+        return Reply(SECRET, "text/html")
 
     with WatchServer({"": page, "news": page}) as running:
         yield running
@@ -191,7 +191,7 @@ def test_a_browser_that_goes_away_does_no_harm(capfd):
     def slow(query):
         began.set()
         go_on.wait(5)
-        return Answer(bytes(10_000_000), "text/html")
+        return Reply(bytes(10_000_000), "text/html")
 
     with WatchServer({"": slow}) as server:
         with socket.create_connection((LOOPBACK, server.server_port)) as connection:

@@ -13,7 +13,9 @@ import csv
 import io
 import json
 import math
+import tomllib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +138,62 @@ def resume(study: Study, folder: Path) -> None:
         study.truths = _truths(file["truths"], study)
         complete = file.attrs["complete"] == json.dumps(study.sweep_settings())
         study.complete = complete and len(study.rows) == len(stored)
+
+
+@dataclass(frozen=True)
+class StoredQuantity:
+    """A quantity of a stored study: its name, the origin of its true value, the error of this value, and the
+    size to which errors are relative, in words."""
+
+    name: str
+    source: str
+    error: float
+    relative_to: str
+
+
+@dataclass(frozen=True)
+class StoredStudy:
+    """A study as its file has it, also while it is running.
+
+    name : of the scene. scene : as TOML. settings : device, threads, precisions and arithmetics.
+    complete : whether all settings are measured.
+    """
+
+    name: str
+    scene: str
+    rows: list[Row]
+    quantities: list[StoredQuantity]
+    settings: dict[str, Any]
+    versions: dict[str, Any]
+    complete: bool
+
+
+def stored(path: Path) -> StoredStudy:
+    """Return the study in a folder, or in a cost.h5. InputError if there is none, or it is damaged."""
+    file_path = path / HDF5 if regular_file.is_folder(path) else path
+    must(regular_file.exists(file_path), "file", f"a study of costs, {HDF5}", str(file_path))
+    with checksum.open_file(file_path, "file", COST_FORMAT) as file:
+        identity, scene = json.loads(file.attrs["identity"]), str(file.attrs["scene"])
+        truths = file["truths"]
+        quantities = [
+            StoredQuantity(
+                name,
+                str(truths[name].attrs["source"]),
+                float(truths[name].attrs["uncertainty"]) / float(truths[name].attrs["size"]),
+                str(truths[name].attrs["errors are relative to"]),
+            )
+            for name in identity["quantities"]
+            if name in truths
+        ]
+        return StoredStudy(
+            name=str(tomllib.loads(scene).get("name", "scene")),
+            scene=scene,
+            rows=rows_in(file),
+            quantities=quantities,
+            settings=json.loads(file.attrs["settings"]),
+            versions=json.loads(file.attrs["versions"]),
+            complete=json.loads(file.attrs["complete"]) is not None,
+        )
 
 
 def rows_in(file: h5py.File) -> list[Row]:

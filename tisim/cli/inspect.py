@@ -1,4 +1,4 @@
-"""The commands ``tisim plot``, ``report``, ``movie``, ``export`` and ``figures`` show the results of runs."""
+"""The commands ``tisim plot``, ``movie``, ``export`` and ``figures`` show the results of runs."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from tisim.cli.options import (
     Threads,
     nameable,
 )
-from tisim.console import err, shown_progress
-from tisim.errors import InputError, must
+from tisim.console import shown_progress
+from tisim.errors import InputError
 from tisim.files import output_folder, pictures, regular_file
 from tisim.files.output_folder import resumes
 from tisim.streams import say
@@ -86,14 +86,14 @@ def plot(
     """
     from tisim.io.reader import frames
 
-    file = _trajectory_file(file)
+    file = trajectory_file(file)
     out_folder = folder or file.parent
     with frames(file, world) as trajectory:
         with pictures.drawing(f"{file}"):
             from tisim.plotting.look import Look
 
             drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ())))
-        _print_missing(trajectory.missing)
+        print_missing(trajectory.missing)
     output_folder.claim(out_folder, drawn, overwrite)
     for name, figure in drawn.items():
         print(_save(figure, out_folder / name))
@@ -109,80 +109,18 @@ def _pictures(trajectory: Frames, look: Look) -> dict[str, Figure]:
     }
     if loads.bodies(trajectory):
         drawn["loads.png"] = loads.loads(trajectory)
-    drawn |= _case_pictures(trajectory)
+    drawn |= case_pictures(trajectory)
     for figure in drawn.values():
         time_series.mark_missing(figure, trajectory)
     return drawn
 
 
-def _case_pictures(trajectory: Frames) -> Mapping[str, Figure]:
+def case_pictures(trajectory: Frames) -> Mapping[str, Figure]:
     """Return the figures that the case of a run draws of it, by the names of their files."""
     from tisim.cases.case import every
 
     case = every().get(trajectory.scene.name)
     return case.pictures(trajectory) if case and case.pictures else {}
-
-
-def report(
-    file: File,
-    to: Annotated[
-        Path | None,
-        typer.Option(
-            "--to",
-            metavar="NAME.html",
-            callback=nameable,
-            help="File to write; report.html in the folder of FILE by default.",
-        ),
-    ] = None,
-    world: World = 0,
-    fields: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--field", metavar="NAME", help="A quantity of particles for colours; all by default. Repeatable."
-        ),
-    ] = None,
-    limit: Annotated[
-        float, typer.Option(metavar="MB", help="Largest size of the file; frames are left out to keep it.")
-    ] = 15.0,
-    contacts: Annotated[
-        bool, typer.Option("--contacts/--no-contacts", help="Store the contacts of grains.")
-    ] = True,
-    checks: Annotated[
-        Path | None,
-        typer.Option(
-            "--checks",
-            metavar="FILE.csv",
-            callback=nameable,
-            help="Checks that 'tisim check --out' has written.",
-        ),
-    ] = None,
-    overwrite: Overwrite = False,
-    plugins: Plugins = None,
-) -> None:
-    """Write a page that shows a run: one HTML file, to open in a browser without a network.
-
-    It shows the particles in three dimensions and in motion, the scene, time series and balances, and the
-    pictures of the case.
-    """
-    from tisim.io.reader import frames
-    from tisim.plotting.time_series import mark_missing
-    from tisim.report.run_report import read_checks, run_report
-    from tisim.report.viewer_data import ReportOptions
-
-    file = _trajectory_file(file)
-    path = to or file.parent / "report.html"
-    must(path.suffix in (".html", ".htm"), "--to", "a file NAME.html", str(path))
-    with frames(file, world) as trajectory, pictures.drawing(f"pictures of {file}"):
-        found = _case_pictures(trajectory) if len(trajectory) > 1 else {}
-        drawn = {
-            name.removesuffix(".png").replace("_", " "): pictures.image(mark_missing(figure, trajectory))
-            for name, figure in found.items()
-        }
-        _print_missing(trajectory.missing)
-    options = ReportOptions(limit, fields or None, contacts, drawn, read_checks(checks) if checks else ())
-    output_folder.claim(path.parent, (path.name,), overwrite)
-    with err().status("writing"):
-        print(run_report(file, path, world, options))
 
 
 def figures(
@@ -255,7 +193,7 @@ def movie(
     """
     from tisim.io.reader import frames
 
-    file = _trajectory_file(file)
+    file = trajectory_file(file)
     path = to or file.with_suffix(".gif")
     with frames(file, world) as trajectory, pictures.drawing(str(path)):
         from tisim.plotting.look import Look
@@ -267,7 +205,7 @@ def movie(
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with shown_progress("drawing") as progress:
             draw(trajectory, path, rate, progress, look)
-        _print_missing(trajectory.missing)
+        print_missing(trajectory.missing)
     print(path)
 
 
@@ -291,7 +229,7 @@ def export(
     from tisim.io.export import export as write
     from tisim.io.reader import frames, world_count
 
-    file = _trajectory_file(file)
+    file = trajectory_file(file)
     names = [name.strip() for name in fields.split(",")] if fields else []
     check(file, kind, names)
     out_folder = folder or file.parent
@@ -300,7 +238,7 @@ def export(
         path = write(file, kind, out_folder, progress, names)
     for world in range(count := world_count(file)):
         with frames(file, world) as trajectory:
-            _print_missing(
+            print_missing(
                 f"world {world}: {trajectory.missing}"
                 if trajectory.missing and count > 1
                 else trajectory.missing
@@ -312,12 +250,13 @@ def _save(figure: Figure, path: Path) -> Path:
     return pictures.write(path, lambda: figure)
 
 
-def _print_missing(missing: str) -> None:
+def print_missing(missing: str) -> None:
+    """Print a sentence about what a trajectory lacks, if there is one."""
     if missing:
         say(missing)
 
 
-def _trajectory_file(path: Path) -> Path:
+def trajectory_file(path: Path) -> Path:
     """Return the trajectory in a folder, or else its result; InputError if the folder has neither."""
     if not regular_file.is_folder(path):
         return path

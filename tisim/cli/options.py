@@ -1,7 +1,8 @@
 """Options shared by several commands."""
 
+from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -24,6 +25,38 @@ def nameable(path: Path | None) -> Path | None:
             f"path must be a valid name of a file or folder; received {abbreviated(str(path))} ({why})"
         ) from None
     return path
+
+
+def given_options(context: typer.Context) -> dict[str, Any]:
+    """Return the arguments and options of a command that were given, by the names of its parameters."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    # Versions of typer differ in the module of this enumeration.
+    return {
+        name: value
+        for name, value in context.params.items()
+        if getattr(sources[name], "name", "") == "COMMANDLINE"
+    }
+
+
+def given_words(context: typer.Context, left_out: Collection[str] = ()) -> list[str]:
+    """Return a command as it was given, in words, options in the order of their definition.
+
+    left_out : names of parameters.
+    """
+    given, words, options = given_options(context), [str(context.info_name)], list[str]()
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        if name not in given or name in left_out:
+            continue
+        value = given[name]
+        if parameter.param_type_name == "argument":
+            words.append(str(value))
+        elif isinstance(value, bool):
+            options += [parameter.opts[0] if value else parameter.secondary_opts[0]]
+        else:
+            for one in value if isinstance(value, list | tuple) else (value,):
+                options += [parameter.opts[0], str(one)]
+    return words + options
 
 
 def _load_plugins(paths: list[str] | None) -> list[str]:

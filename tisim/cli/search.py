@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +21,7 @@ from tisim.cli.options import (
     Seed,
     Size,
     Threads,
+    given_words,
     nameable,
 )
 from tisim.console import err, out, print_stopping
@@ -28,6 +30,9 @@ from tisim.files.atomic import replace_file
 from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
 from tisim.streams import say
+
+if TYPE_CHECKING:
+    from tisim.optimize.problem.problem import Problem
 
 Executor = Annotated[
     str, typer.Option(help="Executor of the runs: batch (this process), processes:N or dask://HOST:PORT.")
@@ -70,6 +75,7 @@ FixedGenes = Annotated[
 
 
 def optimize(
+    context: typer.Context,
     case: Inverse,
     size: Size = None,
     folder: Out = None,
@@ -149,6 +155,7 @@ def optimize(
         outcome = session(
             problem, settings, evaluator, out_folder, out(), err(), print_stopping, overwrite,
             begun=fresh is False, beginning=beginning,
+            command=given_words(context, ("folder", "fresh", "overwrite", "executor", "threads")),
         )  # fmt: skip
     if outcome.interrupted:
         err().print(
@@ -160,6 +167,21 @@ def optimize(
         raise RunError(f"the time limit was reached before the first generation. {hint}")
     if outcome.best is None:
         raise RunError(f"no design has run to its end; 'tisim cache {out_folder / SEARCH_FILE}' says why")
+
+
+def problem_of(words: Sequence[str]) -> Problem:
+    """Return the inverse problem of ``tisim optimize`` with these arguments and options; InputError if there
+    is none."""
+    command = typer.main.get_command(_optimize_alone)
+    options = command.make_context("optimize", list(words), resilient_parsing=True).params
+    problem, _ = targets.inverse_problem(
+        options["case"], options["size"], options["variant"], options["measured"]
+    )
+    return problem.fix(**scene_arguments.assignments(options["fixed"] or (), "--fix"))
+
+
+_optimize_alone = typer.Typer(add_completion=False)
+_optimize_alone.command()(optimize)
 
 
 def compare(

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-SHARE = 0.01
+CORE_SHARE = 0.01
 """Largest share of one core, averaged over time."""
 SHORTEST_WAIT = 0.5
 """A shorter wait is left out, s."""
@@ -23,7 +23,7 @@ class Budget:
 
     def __init__(
         self,
-        share: float = SHARE,
+        share: float = CORE_SHARE,
         clock: Callable[[], float] = time.monotonic,
         processor: Callable[[], float] = time.process_time,
     ) -> None:

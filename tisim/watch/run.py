@@ -32,7 +32,7 @@ from tisim.report.run_report import RESERVED_BYTES, numbers, result_of, run_page
 from tisim.report.viewer_data import ReportOptions, player_facts
 from tisim.scene.scene import Scene
 from tisim.watch.budget import Budget
-from tisim.watch.server import Answer, Answers
+from tisim.watch.server import Replies, Reply
 
 POLL = 2.0
 """Time between two requests of a browser, s."""
@@ -91,11 +91,11 @@ class WatchedRun:
         self._rate = FIRST_RATE
 
     @property
-    def answers(self) -> Answers:
+    def answers(self) -> Replies:
         """Return the functions that answer requests: for the page, and for news since a frame."""
         return {
-            "": lambda query: Answer(self.page().encode(), "text/html"),
-            "news": lambda query: Answer(json.dumps(self.news(query)).encode(), "application/json"),
+            "": lambda query: Reply(self.page().encode(), "text/html"),
+            "news": lambda query: Reply(json.dumps(self.news(query)).encode(), "application/json"),
         }
 
     def page(self) -> str:

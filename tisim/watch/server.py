@@ -41,14 +41,14 @@ HEADERS = {
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """An answer: its content, and the kind of it, such as "text/html"."""
 
     content: bytes
     kind: str
 
 
-Answers = Mapping[str, Callable[[Mapping[str, str]], Answer]]
+Replies = Mapping[str, Callable[[Mapping[str, str]], Reply]]
 """Functions of the query that answer requests, by the last part of the path; "" for the page itself."""
 
 
@@ -57,7 +57,7 @@ class WatchServer(http.server.ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, answers: Answers, port: int = 0) -> None:
+    def __init__(self, answers: Replies, port: int = 0) -> None:
         """port : 0 for one that is free.
 
         Raise InputError if the port cannot be used.
@@ -130,7 +130,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             return HTTPStatus.FORBIDDEN
         return None
 
-    def _answer(self) -> Answer | None:
+    def _answer(self) -> Reply | None:
         """Return the answer, or None if the token is wrong or there is no such name."""
         # Exactly "/token/name": nothing is decoded or resolved, so that no path leads elsewhere.
         path, _, query = self.path.partition("?")

@@ -61,7 +61,6 @@ class Parallel extends Plot {
     if (one.inputs) one.inputs.forEach((input, end) => { input.value = part ? number(part[end], 4) : ""; });
     else one.boxes.forEach((box, k) => { box.firstChild.checked = !part || part.includes(k); });
     this.model.brushed();
-    this.repaint();
   }
 
   clear() {
@@ -90,9 +89,8 @@ class Parallel extends Plot {
   }
 
   draw(pen, colours) {
-    const count = this.axes[0].values.length;
-    this.order ??= [...Array(count).keys()].sort((a, b) => this.model.order(a) - this.model.order(b));
-    for (const k of this.order) if (!this.model.included(k)) pen.line(this.places(k), { stroke: colours.quiet, alpha: FAINT });
+    this.order ??= [...this.axes[0].values.keys()].sort((a, b) => this.model.order(a) - this.model.order(b));
+    this.drawOthers(pen, colours);
     const some = this.order.filter((k) => this.model.included(k)), alpha = Math.max(0.25, Math.min(0.9, 150 / some.length));
     for (const k of some) pen.line(this.places(k), { stroke: this.model.colour(k), width: 1.2, alpha });
     this.axes.forEach(({ axis, brush }, at) => {
@@ -114,6 +112,25 @@ class Parallel extends Plot {
         pen.rect(x - 7, top, 14, Math.max(bottom - top, 1), { fill: colours.accent, stroke: colours.accent, alpha: 0.35 });
       }
     });
+  }
+
+  /** Draws the designs outside the chosen parts: all designs as one faint picture, which is drawn once. */
+  drawOthers(pen, colours) {
+    if (this.axes.every(({ brush }) => !brush)) return;
+    const style = { stroke: colours.quiet, alpha: FAINT };
+    if (pen instanceof SvgPen) {
+      for (const k of this.order) if (!this.model.included(k)) pen.line(this.places(k), style);
+      return;
+    }
+    const key = `${this.wide} ${colours.quiet}`;
+    if (this.faint?.key !== key) {
+      const canvas = element("canvas", { width: this.canvas.width, height: this.canvas.height });
+      const faint = this.pen(canvas);
+      for (const k of this.order) faint.line(this.places(k), style);
+      this.faint = { key, canvas };
+    }
+    pen.context.globalAlpha = 1;
+    pen.context.drawImage(this.faint.canvas, 0, 0, this.wide, this.high);
   }
 
   names(at) {

@@ -60,3 +60,16 @@ function csv(rows) {
   };
   return rows.map((row) => row.map(cell).join(",")).join("\n") + "\n";
 }
+
+/** One of many that is chosen, and those who are told of it. */
+class Choice {
+  constructor() {
+    Object.assign(this, { chosen: -1, listeners: [] });
+  }
+
+  choose(k) {
+    if (k === this.chosen || k < 0) return;
+    this.chosen = k;
+    for (const listener of this.listeners) listener(k);
+  }
+}

@@ -85,6 +85,15 @@ class SvgPen {
   }
 }
 
+/** Values 1, 2, 5, 10 ... between two ends, or evenly spaced ones if these are fewer than two. */
+function roundLogarithmicTicks(low, high) {
+  const ticks = [];
+  for (let power = Math.floor(Math.log10(low)); 10 ** power <= high; power++) {
+    ticks.push(...[1, 2, 5].map((k) => k * 10 ** power).filter((value) => value >= low && value <= high));
+  }
+  return ticks.length > 1 ? ticks : roundTicks(low, high, 4);
+}
+
 /** An axis of values: its ends, a logarithm if asked, and the categories if the values are their numbers. */
 class Axis {
   /** facts : label, unit, perhaps logarithmic, categories, ends (low, high); values : all that are shown. */
@@ -135,8 +144,8 @@ class Axis {
     }
     const [low, high] = this.ends;
     if (this.logarithmic) {
-      const powers = powerTicks(low, high, most), written = powers.every((value) => Math.abs(Math.log10(value) % 1) < 1e-9);
-      return { label: name(raised(this.unit)), ticks: powers.map((value) => [value, written ? raised(`10^${Math.round(Math.log10(value))}`) : number(value, 3)]) };
+      const wide = high > 300 * low, values = wide ? powerTicks(low, high, most) : roundLogarithmicTicks(low, high);
+      return { label: name(raised(this.unit)), ticks: values.map((value) => [value, wide ? raised(`10^${Math.round(Math.log10(value))}`) : number(value, 3)]) };
     }
     const [by, unit] = axisUnit(Math.max(Math.abs(low), Math.abs(high)), this.unit);
     return { label: name(unit), ticks: roundTicks(low / by, high / by, most).map((value) => [value * by, number(value, 5)]) };
@@ -169,6 +178,13 @@ class Plot {
       element("div", { class: "layers" }, this.canvas, this.above), this.readout);
     place.append(this.figure);
     new ResizeObserver(() => this.resize()).observe(this.canvas.parentNode);
+    // A figure that is out of sight is drawn when it comes into view.
+    this.seen = true;
+    this.stale = null;
+    new IntersectionObserver(([entry]) => {
+      this.seen = entry.isIntersecting;
+      if (this.seen && this.stale) this[this.stale]();
+    }, { rootMargin: "200px" }).observe(this.canvas);
   }
 
   resize() {
@@ -185,7 +201,8 @@ class Plot {
   }
 
   pen(canvas) {
-    const context = canvas.getContext("2d");
+    // Thousands of small shapes are faster in memory than sent to a graphics card, or to what stands for one.
+    const context = canvas.getContext("2d", { willReadFrequently: true });
     context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     context.globalAlpha = 1;
     context.clearRect(0, 0, this.wide, this.high);
@@ -194,19 +211,25 @@ class Plot {
 
   paint() {
     if (!this.wide) return;
+    this.stale = null;
     this.draw(this.pen(this.canvas), inks());
     this.point();
   }
 
   /** Draws again before the next picture of the browser, once however often it is asked. */
   repaint() {
-    if (this.asked) return;
+    if (!this.seen) this.stale = "paint";
+    if (this.asked || !this.seen) return;
     this.asked = true;
     requestAnimationFrame(() => { this.asked = false; this.paint(); });
   }
 
   point() {
-    if (this.wide) this.drawAbove(this.pen(this.above), inks());
+    if (!this.seen) this.stale ??= "point";
+    else if (this.wide) {
+      if (this.stale === "point") this.stale = null;
+      this.drawAbove(this.pen(this.above), inks());
+    }
   }
 
   name() {

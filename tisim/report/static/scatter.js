@@ -126,7 +126,8 @@ class Scatter extends Plot {
 
   read() {
     const k = this.over >= 0 ? this.over : this.model.chosen();
-    this.readout.textContent = k >= 0 && this.shows(k) ? this.model.describe(k) : "";
+    const { x, y, describe } = this.model, shown = k >= 0 && this.shows(k);
+    this.readout.textContent = !shown ? "" : this.options.compact ? `${this.across.text(x[k])}, ${this.up.text(y[k])}` : describe(k);
   }
 
   /** After another point has been chosen elsewhere. */

@@ -5,9 +5,10 @@ const FEW = 400;                // up to this number of designs, all have error 
 const FIRST_PAIRS = 4;          // genes in the pair plots at first
 
 /** What a search has found, by design. */
-class Designs {
+class Designs extends Choice {
   /** facts : columns of genes, objectives, constraints; gen, rank, best, starts, freshStarts, failed, runs. */
   constructor(facts) {
+    super();
     Object.assign(this, facts.designs);
     const places = (one) => (one.choices ? one.values.map((value) => one.choices.indexOf(value)) : one.values.map((value) => value ?? NaN));
     for (const one of this.genes) one.places = places(one);
@@ -16,15 +17,7 @@ class Designs {
       one.reported = one.values.map((value, k) => (one.fresh && Number.isFinite(one.fresh[k]) ? one.fresh[k] : value));
     }
     this.count = this.gen.length;
-    this.chosen = -1;
     this.included = new Uint8Array(this.count).fill(1);
-    this.listeners = [];
-  }
-
-  choose(k) {
-    if (k === this.chosen || k < 0) return;
-    this.chosen = k;
-    for (const listener of this.listeners) listener(k);
   }
 
   axis(one) {
@@ -136,6 +129,7 @@ class Clouds {
     } catch (error) {
       return this.place.replaceChildren(element("p", { class: "warning", role: "alert" }, `The particles cannot be shown: ${error.message}`));
     }
+    right.querySelector("details").open = false;
     this.player.theme(document.documentElement.dataset.theme === "dark");
     this.player.viewer.listeners.push(() => this.follow());
     this.player.go(trajectory.frames - 1);
@@ -169,7 +163,7 @@ class Panel {
     const { designs, facts } = this, button = (text, label, step) => element("button", { type: "button", "aria-label": label, onclick: () => designs.choose(this.table.next(k, step)) }, text);
     const rank = designs.rank[k] ? `${facts.several ? "on the front" : `rank ${designs.rank[k]}`}${designs.best[k] ? (facts.several ? ", nearest to the best of each" : ", the best") : ""}` : `generation ${designs.gen[k]}`;
     this.place.replaceChildren(
-      element("h2", {}, `Design ${k + 1} `, element("span", { class: "quiet" }, rank)),
+      element("h2", {}, `Design ${k + 1}`), element("p", { class: "quiet" }, rank),
       element("div", { class: "buttons" }, button("\u2039 before", "Design before in the table", -1), button("after \u203a", "Design after in the table", 1)),
       ...(designs.failed[k] ? [element("p", { class: "warning failed" }, `It failed: ${designs.failed[k]}`)] : [this.values(k), this.accuracy(k)]),
       element("h3", {}, "Genes"), this.genes(k), this.cost(k), ...this.scene(k));
@@ -183,7 +177,7 @@ class Panel {
     const { designs } = this, fresh = designs.freshStarts[k];
     const row = (one) => {
       const own = `${quantity(one.values[k], one.unit)}${one.errors[k] > 0 ? ` \u00b1 ${quantity(one.errors[k], one.unit, 2)}` : ""}`;
-      const again = fresh && one.fresh ? `${quantity(one.fresh[k], one.unit)} (${number(one.low[k])} to ${number(one.high[k])})` : "none";
+      const again = !fresh || !one.fresh ? "none" : `${quantity(one.fresh[k], one.unit)}${Number.isFinite(one.low[k]) ? ` (${quantity(one.low[k], one.unit)} to ${quantity(one.high[k], one.unit)})` : ""}`;
       return element("tr", {}, ...this.cells(one.name, own, again));
     };
     const head = ["", `${designs.starts[k]} start${designs.starts[k] === 1 ? "" : "s"}`, fresh ? `${fresh} fresh starts` : "fresh starts"];
@@ -267,7 +261,9 @@ class SearchPage {
     this.file = facts.name.replace(/[^\w.-]+/g, "_");
     this.plots = [];
     const generation = { name: "generation", symbol: "generation", unit: "", whole: true };
-    for (const one of facts.convergence) new Chart(id("convergence"), one, facts.generations, () => {}, this.file, generation);
+    const chart = (place) => (one) => new Chart(place, one, facts.generations, () => {}, this.file, generation);
+    facts.convergence.forEach(chart(id("convergence")));
+    facts.progress.forEach(chart(id("progress")));
     if (!designs.count) return;
     this.histories(id("convergence"));
     if (facts.several) this.fronts(id("fronts"));
@@ -279,7 +275,7 @@ class SearchPage {
     this.pairs(id("pairs"));
     this.table = new RowTable(id("rows"), designs.count, designColumns(designs, facts),
       { file: `${this.file}_designs`, label: "designs", chosen: () => designs.chosen, choose: (k) => designs.choose(k) });
-    const panel = new Panel(id("design"), facts, designs, this.table);
+    const panel = new Panel(id("chosen"), facts, designs, this.table);
     this.clouds = facts.recordings.length ? new Clouds(id("views"), facts, bytes) : null;
     const bar = id("shown");
     designs.listeners.push((k) => {
@@ -398,9 +394,11 @@ class SearchPage {
       designs.included[k] = this.parallel.within(k);
       if (designs.included[k]) inside.push(k);
     }
-    this.table.filter(inside.length < designs.count ? inside : null);
+    // The table follows when the pointer rests.
+    clearTimeout(this.filtering);
+    this.filtering = setTimeout(() => this.table.filter(inside.length < designs.count ? inside : null), 80);
     this.tell();
-    for (const plot of [...this.plots, ...this.pairPlots]) plot.repaint();
+    for (const plot of [...this.plots, ...this.pairPlots, this.parallel]) plot.repaint();
   }
 
   tell() {
