@@ -7,8 +7,10 @@ import pytest
 
 from tests.report.test_in_browser import READ_PICKED, until
 from tisim.engine.result import Status
+from tisim.optimize.report import watched_search
 from tisim.report.page import static
 from tisim.watch import run as module
+from tisim.watch import waiting
 from tisim.watch.run import WatchedRun
 from tisim.watch.server import WatchServer
 
@@ -23,9 +25,10 @@ def watching(browser, tmp_path, monkeypatch, unlimited):
     problems = []
 
     @contextmanager
-    def show(folder=tmp_path, poll=0.2):
-        monkeypatch.setattr(module, "POLL", poll)
-        with WatchServer(WatchedRun(folder, budget=unlimited).answers) as server:
+    def show(answers=None):
+        for one in (module, watched_search, waiting):
+            monkeypatch.setattr(one, "POLL", 0.2)
+        with WatchServer(answers or WatchedRun(tmp_path, budget=unlimited).answers) as server:
             context = browser.new_context(viewport={"width": 1000, "height": 800})
             page = context.new_page()
             page.on(
@@ -74,7 +77,7 @@ def test_frames_arrive_without_losing_the_view(growing, watching):
     with watching() as (page, _):
         assert page.inner_text(".status") == "running"
         until(page, "document.documentElement.dataset.live === 'running'")
-        assert page.inner_text("p.live").startswith("Watching: 1 frames, the last one ")
+        assert page.inner_text("p.live").startswith("Watching: one frame, the last one ")
         assert page.locator("input[aria-label=Frame]").is_disabled()
         run.write(2)
         until(page, "report.trajectory.frames === 3")
@@ -116,8 +119,8 @@ def test_frames_arrive_without_losing_the_view(growing, watching):
         until(page, "document.querySelector('.status').textContent === 'ok'")
         until(page, "report.trajectory.parts.length === 1")
         assert_shows(page, run)
-        assert page.inner_text("p.live") == "The run has ended. 6 frames."
-        assert page.text_content("[role=status].unseen") == "The run has ended. 6 frames."
+        assert page.inner_text("p.live") == "The run has ended: 6 frames."
+        assert page.text_content("[role=status].unseen") == "The run has ended: 6 frames."
         assert "particle steps" in page.inner_text("#numbers")
         assert page.get_by_role("button", name="Save balances as CSV").count() == 1
         assert page.evaluate("({ ...report.player.viewer.camera })") == before
@@ -146,7 +149,7 @@ def test_an_unreadable_file_and_a_stopped_server_are_told(growing, watching, bro
         run.write()
         path.write_bytes(content[:-100])
         until(page, "document.documentElement.dataset.live === 'problem'")
-        assert "The run cannot be read at this moment; this is its last good state." in page.inner_text(
+        assert "The files cannot be read at this moment; this is their last good state." in page.inner_text(
             "p.live"
         )
         assert page.evaluate("report.trajectory.frames") == 3

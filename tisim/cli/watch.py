@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,9 @@ from tisim.cli.options import Plugins, nameable
 from tisim.errors import must
 from tisim.files import regular_file
 from tisim.streams import say
+
+if TYPE_CHECKING:
+    from tisim.watch.server import Replies
 
 Folder = Annotated[
     Path,
@@ -37,17 +40,16 @@ def watch(
     world: World = 0,
     plugins: Plugins = None,
 ) -> None:
-    """Show a run in the browser while it is running: the page of a report, with new frames as they come.
+    """Show a run or a search in the browser while it is running: the page of 'tisim report', kept up to date.
 
     The page is served to this machine alone, at an address with a random token, until Ctrl-C. Nothing is
-    written, and the run is slowed by at most 1 % of one core after the first page.
+    written. After the first page it takes at most 1 % of one core.
     """
-    from tisim.watch.run import WatchedRun
     from tisim.watch.server import WatchServer
 
     exists = regular_file.is_folder(folder) or regular_file.exists(folder)
     must(exists, "folder to watch", "an existing one", str(folder))
-    with WatchServer(WatchedRun(folder, world).answers, port) as server, _link(server.address) as link:
+    with WatchServer(_answers(folder, world), port) as server, _link(server.address) as link:
         print(server.address, flush=True)
         say("watching until Ctrl-C")
         if open_:
@@ -56,6 +58,20 @@ def watch(
             threading.Event().wait()
         except KeyboardInterrupt:
             say("stopped")
+
+
+def _answers(path: Path, world: int) -> Replies:
+    """Return the answers of the pages of a search, or else of a run."""
+    is_search = path.name == "search.h5" or any(
+        regular_file.exists(path / name) for name in ("search.h5", "search.h5.journal")
+    )
+    if is_search:
+        from tisim.optimize.report.watched_search import WatchedSearch
+
+        return WatchedSearch(path).answers
+    from tisim.watch.run import WatchedRun
+
+    return WatchedRun(path, world).answers
 
 
 @contextmanager

@@ -19,7 +19,6 @@ from typing import Any, cast
 import numpy as np
 
 from tisim.engine.result import Result
-from tisim.errors import InputError, RunError
 from tisim.files import regular_file
 from tisim.io.reader import Frame, Frames, frames
 from tisim.plotting import time_series
@@ -27,21 +26,18 @@ from tisim.report import tables
 from tisim.report.compressed_trajectory import compress
 from tisim.report.contact_network import contact_network, has_contacts
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.page import COMMON_SCRIPTS, WATCH_SCRIPTS, Page, text_data
+from tisim.report.page import WATCHED_RUN_SCRIPTS, text_data
 from tisim.report.run_report import RESERVED_BYTES, numbers, result_of, run_page, status_of, summary
 from tisim.report.viewer_data import ReportOptions, player_facts
 from tisim.scene.scene import Scene
 from tisim.watch.budget import Budget
 from tisim.watch.server import Replies, Reply
+from tisim.watch.waiting import POLL, UNREADABLE, waiting_page
 
-POLL = 2.0
-"""Time between two requests of a browser, s."""
 UPDATE_SECONDS = 0.05
 """Processor time of an update that is aimed at, s; it always has one frame."""
 FIRST_RATE = 1e-6
 """Processor time for a particle in a frame, assumed before it is measured, s."""
-UNREADABLE = (InputError, RunError, OSError)
-"""Errors of files that change, or are damaged."""
 
 
 @dataclass(frozen=True)
@@ -104,21 +100,27 @@ class WatchedRun:
             try:
                 file = self._file()
                 if file is None:
-                    return self._waiting("There is no frame yet.")
+                    return waiting_page(self._path, "There is no frame yet.", "watch.js")
                 with frames(file, self._world) as sequence:
                     if not len(sequence):
-                        return self._waiting("There is no frame yet.")
+                        return waiting_page(self._path, "There is no frame yet.", "watch.js")
                     opened = self._open(file, sequence)
                     result = self._ended(file, opened.scene)
                     page = run_page(KeptFrames(sequence), self._options, result)
             except UNREADABLE as failure:
-                return self._waiting(f"The run cannot be read at this moment: {failure}.")
+                return waiting_page(
+                    self._path, f"The run cannot be read at this moment: {failure}.", "watch.js"
+                )
         live = self._state(file, result) | {
             "key": opened.key, "after": len(sequence) - 1, "poll": POLL, "all": len(sequence),
         }  # fmt: skip
         verdict = page.verdict if live["ended"] else "running"
         return replace(
-            page, verdict=verdict, facts=page.facts | {"live": live}, scripts=WATCH_SCRIPTS, connects=True
+            page,
+            verdict=verdict,
+            facts=page.facts | {"live": live},
+            scripts=WATCHED_RUN_SCRIPTS,
+            connects=True,
         ).html()
 
     def news(self, query: Mapping[str, str]) -> dict[str, Any]:
@@ -175,11 +177,11 @@ class WatchedRun:
             self._rate = (time.process_time() - began) / sum(len(one.arrays["id"]) + 1 for one in new)
             ends, shown = (opened.first, new[-1]), len(chosen)
         first, last = (frame.arrays for frame in ends)
-        _, verdict, sentences = status_of(sequence.missing, result)
+        state, verdict, sentences = status_of(sequence.missing, result)
         span = float(ends[0].time), float(ends[1].time)
         return {
             "facts": facts, "recording": text_data(recording), "after": count - 1, "shown": shown,
-            "all": count, "notices": sentences, "verdict": verdict if result else "running",
+            "all": count, "notices": sentences, "verdict": verdict if result else "running", "state": state,
             "numbers": numbers(result, (first, last)),
             "summary": summary((len(first["mass"]), len(last["mass"])), count, count, span),
         }  # fmt: skip
@@ -231,17 +233,3 @@ class WatchedRun:
     def _state(self, file: Path, result: Result | None) -> dict[str, Any]:
         """Return whether the run has ended, and the time since the last change of the file, s."""
         return {"ended": result is not None, "age": max(0.0, time.time() - file.stat().st_mtime)}
-
-    def _waiting(self, why: str) -> str:
-        """Return a page that asks until there is a run to show."""
-        return Page(
-            title=self._path.name or str(self._path),
-            state="unfinished",
-            verdict="waiting",
-            summary=why,
-            facts={"live": {"waiting": True, "poll": POLL}},
-            recording=b"",
-            scripts=(*COMMON_SCRIPTS, "watch.js"),
-            view="",
-            connects=True,
-        ).html()
