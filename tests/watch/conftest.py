@@ -80,4 +80,4 @@ def clock():
 @pytest.fixture
 def unlimited():
     """A budget that allows work at once."""
-    return Budget(share=np.inf)
+    return Budget(share=np.inf, credit=0.0)

@@ -12,6 +12,7 @@ from tisim import Material
 from tisim.effects import Granular, Walls
 from tisim.engine.result import Status
 from tisim.geometry import Plane
+from tisim.io.reader import frames
 from tisim.report.columns import Column, Scale, whole_numbers
 from tisim.watch import run as module
 from tisim.watch.budget import Budget
@@ -63,7 +64,7 @@ def test_new_frames_arrive_and_the_end_is_told(growing, tmp_path, unlimited):
     run.write(3)
     page = watched.page()
     live = facts_of(page)["live"]
-    assert (live["after"], live["ended"], live["all"]) == (2, False, 3)
+    assert (live["after"], live["ended"], live["all"]) == (2, "", 3)
     assert "running" in text_of(page).splitlines()
     ask = {"key": live["key"]}
     nothing = watched.news({**ask, "after": "2"})
@@ -87,11 +88,11 @@ def test_new_frames_arrive_and_the_end_is_told(growing, tmp_path, unlimited):
     run.end()
     news = watched.news({**ask, "after": "4"})
     assert_frames(news, run, [5])
-    assert (news["ended"], news["verdict"]) == (True, "ok")
+    assert (news["ended"], news["verdict"]) == ("result", "ok")
     everything = watched.news({**ask, "after": "-1"})
     assert_frames(everything, run, list(range(6)))
     assert "particle steps" in everything["numbers"]
-    assert facts_of(watched.page())["live"]["ended"]
+    assert facts_of(watched.page())["live"]["ended"] == "result"
 
 
 def test_a_failed_run_says_why(growing, tmp_path, unlimited):
@@ -133,9 +134,36 @@ def test_of_fast_frames_some_are_shown_and_the_last(growing, tmp_path, unlimited
     assert_frames(watched.news({"key": key, "after": "10"}), run, [12])
 
 
+def test_complete_frames_without_a_result_have_ended(growing, tmp_path, unlimited):
+    """As of a recording in Python."""
+    run, watched = growing(duration=0.03), WatchedRun(tmp_path, budget=unlimited)
+    run.write(3)
+    key = facts_of(watched.page())["live"]["key"]
+    run.write()
+    news = watched.news({"key": key, "after": "2"})
+    assert (news["ended"], news["verdict"], news["notices"]) == ("frames", "complete", [])
+    run.end()
+    assert watched.news({"key": key, "after": "3"})["ended"] == "result"
+
+
+def test_files_that_have_not_changed_are_not_opened(growing, tmp_path, unlimited, monkeypatch):
+    run, watched = growing(), WatchedRun(tmp_path, budget=unlimited)
+    run.write(3)
+    ask = {"key": facts_of(watched.page())["live"]["key"], "after": "2"}
+    watched.news(ask)
+    opened = []
+    monkeypatch.setattr(module, "frames", lambda *given: (opened.append(given), frames(*given))[1])
+    for _ in range(3):
+        assert watched.news(ask)["after"] == 2
+    assert opened == []
+    run.write()
+    assert_frames(watched.news(ask), run, [3])
+    assert len(opened) == 1
+
+
 def test_the_budget_delays_news(growing, tmp_path, clock):
     run = growing()
-    watched = WatchedRun(tmp_path, budget=Budget(0.01, clock, clock.processor))
+    watched = WatchedRun(tmp_path, budget=Budget(0.01, 0.0, clock, clock.processor))
     run.write()
     key = facts_of(watched.page())["live"]["key"]
     run.write()

@@ -57,7 +57,7 @@ def test_a_page_has_all_designs_and_changes_with_the_files(search, tmp_path, unl
 
 
 def test_the_budget_delays_a_new_page(search, tmp_path, clock):
-    watched = WatchedSearch(tmp_path, budget=Budget(0.01, clock, clock.processor))
+    watched = WatchedSearch(tmp_path, budget=Budget(0.01, 0.0, clock, clock.processor))
     search(0)
     version = {"version": facts_of(watched.page())["live"]["version"]}
     search(1)

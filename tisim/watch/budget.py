@@ -8,15 +8,15 @@ from contextlib import contextmanager
 
 CORE_SHARE = 0.01
 """Largest share of one core, averaged over time."""
-SHORTEST_WAIT = 0.5
-"""A shorter wait is left out, s."""
+CREDIT = 1.0
+"""Processor time that may be used at once after a time with less work, s."""
 
 
 class Budget:
-    """Work is allowed again when the processor time of this process is a share of the time that has passed.
+    """Work is allowed as long as the processor time of this process is at most CREDIT and a share of the time
+    that has passed (a leaky bucket).
 
-    All of the process counts, also answers without news, except work within ``exempt``. Time without work is
-    not saved up.
+    All of the process counts, also answers without news, except work within ``exempt``.
 
     clock, processor : functions that return the time, and the processor time of this process, s.
     """
@@ -24,20 +24,20 @@ class Budget:
     def __init__(
         self,
         share: float = CORE_SHARE,
+        credit: float = CREDIT,
         clock: Callable[[], float] = time.monotonic,
         processor: Callable[[], float] = time.process_time,
     ) -> None:
-        self._share, self._clock, self._processor = share, clock, processor
-        self._counted, self._allowed = processor(), clock()
+        self._share, self._saved = share, credit / share
+        self._clock, self._processor = clock, processor
+        self._counted, self._allowed = processor(), clock() - self._saved
 
     def wait(self) -> float:
         """Return the time until work is allowed, s; 0 if it is."""
         now, used = self._clock(), self._processor()
-        self._allowed = max(self._allowed, now) + (used - self._counted) / self._share
+        self._allowed = max(self._allowed, now - self._saved) + (used - self._counted) / self._share
         self._counted = used
-        wait = self._allowed - now
-        # Short answers alone do not delay the next work.
-        return wait if wait > SHORTEST_WAIT else 0.0
+        return max(0.0, self._allowed - now)
 
     @contextmanager
     def exempt(self) -> Iterator[None]:

@@ -85,6 +85,8 @@ class WatchedRun:
         self._opened: _Opened | None = None
         self._result: tuple[Any, Result | None] = (None, None)
         self._rate = FIRST_RATE
+        # The end of the run, and the state of the files that was read last with its number of frames.
+        self._end, self._read = "", (tuple[Any, ...](), 0)
 
     @property
     def answers(self) -> Replies:
@@ -97,6 +99,7 @@ class WatchedRun:
     def page(self) -> str:
         """Return the page with all frames that exist, thinned to the limit; or one that waits for them."""
         with self._lock, self._budget.exempt():
+            began = time.process_time()
             try:
                 file = self._file()
                 if file is None:
@@ -105,13 +108,16 @@ class WatchedRun:
                     if not len(sequence):
                         return waiting_page(self._path, "There is no frame yet.", "watch.js")
                     opened = self._open(file, sequence)
-                    result = self._ended(file, opened.scene)
+                    result = self._ended(file, opened.scene, sequence)
                     page = run_page(KeptFrames(sequence), self._options, result)
+                    values = len(sequence) * len(opened.first.arrays["id"])
             except UNREADABLE as failure:
                 return waiting_page(
                     self._path, f"The run cannot be read at this moment: {failure}.", "watch.js"
                 )
-        live = self._state(file, result) | {
+            # Mostly imports and the text of the scene, if there are few frames.
+            self._rate = min(FIRST_RATE, (time.process_time() - began) / max(values, 1))
+        live = self._state(file) | {
             "key": opened.key, "after": len(sequence) - 1, "poll": POLL, "all": len(sequence),
         }  # fmt: skip
         verdict = page.verdict if live["ended"] else "running"
@@ -141,7 +147,9 @@ class WatchedRun:
         file = self._file()
         if file is None:
             return {"waiting": True}
-        state = self._state(file, self._result[1])
+        state, marks = self._state(file), self._marks(file)
+        if self._read == (marks, after + 1):
+            return state | {"after": after}
         seen = self._opened is not None and self._opened.key == key
         wait = self._budget.wait()
         if wait and not (state["ended"] and after < 0):
@@ -153,9 +161,10 @@ class WatchedRun:
             opened = self._open(file, sequence)
             if not seen or opened.key != key or after >= count:
                 return {"reload": True}
-            result = self._ended(file, opened.scene)
-            state = self._state(file, result)
+            result = self._ended(file, opened.scene, sequence)
+            state = self._state(file)
             if after == count - 1:
+                self._read = marks, count
                 return state | {"after": after}
             return state | self._update(sequence, opened, result, after)
 
@@ -181,7 +190,8 @@ class WatchedRun:
         span = float(ends[0].time), float(ends[1].time)
         return {
             "facts": facts, "recording": text_data(recording), "after": count - 1, "shown": shown,
-            "all": count, "notices": sentences, "verdict": verdict if result else "running", "state": state,
+            "all": count, "notices": sentences, "state": state,
+            "verdict": verdict if self._end else "running",
             "numbers": numbers(result, (first, last)),
             "summary": summary((len(first["mass"]), len(last["mass"])), count, count, span),
         }  # fmt: skip
@@ -221,15 +231,21 @@ class WatchedRun:
             sequence.scene = self._opened.scene
         return self._opened
 
-    def _ended(self, file: Path, scene: Scene) -> Result | None:
-        """Return the result of the run if it has ended; it is read once."""
-        path = file.with_name("result.h5")
-        status = regular_file.file_status(path)
-        mark = None if status is None else (status.st_ino, status.st_size, status.st_mtime_ns)
+    def _ended(self, file: Path, scene: Scene, sequence: Frames) -> Result | None:
+        """Return the result of the run if it has one; it is read once."""
+        mark = self._marks(file)[1]
         if mark != self._result[0]:
-            self._result = mark, result_of(path, scene) if mark else None
-        return self._result[1]
+            self._result = mark, result_of(file, scene) if mark else None
+        result = self._result[1]
+        self._end = "result" if result is not None else "" if sequence.missing else "frames"
+        return result
 
-    def _state(self, file: Path, result: Result | None) -> dict[str, Any]:
-        """Return whether the run has ended, and the time since the last change of the file, s."""
-        return {"ended": result is not None, "age": max(0.0, time.time() - file.stat().st_mtime)}
+    def _marks(self, file: Path) -> tuple[Any, ...]:
+        """Return marks of the file and of the result beside it, which differ when they have changed."""
+        found = (regular_file.file_status(path) for path in (file, file.with_name("result.h5")))
+        return tuple(one and (one.st_ino, one.st_size, one.st_mtime_ns) for one in found)
+
+    def _state(self, file: Path) -> dict[str, Any]:
+        """Return how the run has ended ("" if it has not, "frames" if its frames are complete, "result" if it
+        has a result), and the time since the last change of the file, s."""
+        return {"ended": self._end, "age": max(0.0, time.time() - file.stat().st_mtime)}

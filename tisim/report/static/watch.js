@@ -3,7 +3,7 @@
 const MOST_BYTES = 4e8;         // decoded numbers in memory, above which all frames are read again, thinned
 
 class LiveRun extends Live {
-  /** Whether to read all frames again: at the end, with the counts of the run, or to save memory. */
+  /** Whether to read all frames again: at the end, with the counts of the run if it has a result, or to save memory. */
   get all() {
     return Boolean(this.leftOut) && (this.live.ended || report.trajectory.bytes > MOST_BYTES);
   }
@@ -19,7 +19,7 @@ class LiveRun extends Live {
       this.leftOut = !all && (this.leftOut || news.shown < news.after - live.after);
       Object.assign(live, { after: news.after, all: news.all });
     }
-    if (news.ended && !live.ended && !all) this.leftOut = true;
+    if (news.ended !== live.ended && news.ended && !all) this.leftOut = true;
     live.ended = news.ended;
     const count = live.all === 1 ? "one frame" : `${live.all} frames`;
     if (news.ended) this.tell("ended", `The run has ended: ${count}.`);
