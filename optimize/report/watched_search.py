@@ -33,7 +33,7 @@ class WatchedSearch:
     ) -> None:
         """folder : of the search, or its search.h5. options : of the page."""
         self._file = folder / SEARCH_FILE if regular_file.is_folder(folder) else folder
-        self._options, self._budget = options, budget or Budget()
+        self._options, self._budget = options, budget or Budget(credit=0.0)
         self._lock = threading.Lock()
         self._made: tuple[str, str] = ("", "")
         self._ended = False

@@ -3,12 +3,13 @@
 import http.client
 import socket
 import threading
+import time
 from http import HTTPStatus
 
 import pytest
 
 from tisim import InputError
-from tisim.watch.server import HEADERS, LOOPBACK, Reply, WatchServer
+from tisim.watch.server import HEADERS, LOOPBACK, REQUEST_TIMEOUT, Reply, WatchServer
 
 SECRET = b"the page"
 
@@ -207,6 +208,29 @@ def test_a_port_that_is_taken_or_none_is_refused(server):
         WatchServer({}, server.server_port)
     with pytest.raises(InputError, match="port must be 0 to 65535; received 70000"):
         WatchServer({}, 70000)
+
+
+def test_it_ends_at_once_beside_idle_connections_and_after_answers():
+    began, go_on, replies = threading.Event(), threading.Event(), []
+
+    def slow(query):
+        began.set()
+        go_on.wait(5)
+        return Reply(SECRET, "text/html")
+
+    server = WatchServer({"": slow})
+    with server:
+        idle = socket.create_connection((LOOPBACK, server.server_port))
+        asking = threading.Thread(target=lambda: replies.append(request(server)))
+        asking.start()
+        assert began.wait(5)
+        threading.Timer(0.2, go_on.set).start()
+        before = time.monotonic()
+    assert time.monotonic() - before < REQUEST_TIMEOUT / 2
+    asking.join()
+    idle.close()
+    assert replies[0][2] == SECRET
+    assert [one for one in threading.enumerate() if "process_request" in one.name] == []
 
 
 def test_after_its_end_nothing_answers():

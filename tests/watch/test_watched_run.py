@@ -14,6 +14,7 @@ from tisim.engine.result import Status
 from tisim.geometry import Plane
 from tisim.io.reader import frames
 from tisim.report.columns import Column, Scale, whole_numbers
+from tisim.report.compressed_trajectory import compress
 from tisim.watch import run as module
 from tisim.watch.budget import Budget
 from tisim.watch.run import WatchedRun
@@ -113,6 +114,23 @@ def test_curves_of_new_frames_go_on(growing, tmp_path, unlimited):
         for curve, new in zip(one["curves"], named[one["title"]]["curves"], strict=True):
             assert new["label"] == curve["label"]
             assert new["values"] == pytest.approx(curve["values"][4:])
+
+
+def test_all_parts_have_scales_of_one_kind(growing, tmp_path, unlimited):
+    """Colours of speeds that spread over decades would be logarithmic in a report."""
+    run, watched = growing(n=500), WatchedRun(tmp_path, budget=unlimited)
+    speeds = np.geomspace(1e-6, 1.0, run.n)[:, None] * [0.0, 0.0, 1.0]
+    usual = run.arrays
+    run.arrays = lambda k: {**usual(k), "velocity": (k + 1) * speeds}
+    run.write(2)
+    first = facts_of(watched.page())
+    run.write()
+    asked = [watched.news({"key": first["live"]["key"], "after": after})["facts"] for after in ("1", "-1")]
+    for facts in (first, *asked):
+        (speed,) = (one for one in facts["trajectory"]["columns"] if one["name"] == "speed")
+        assert not speed["logarithmic"]
+    with frames(tmp_path / "trajectory.h5") as sequence:
+        assert compress(sequence, [0, 1]).column("speed").scale.logarithmic
 
 
 def test_of_fast_frames_some_are_shown_and_the_last(growing, tmp_path, unlimited, monkeypatch):

@@ -104,12 +104,17 @@ class CompressedTrajectory:
 
 
 def compress(
-    frames: FrameSequence, chosen: Sequence[int], part: int = 1, names: Sequence[str] | None = None
+    frames: FrameSequence,
+    chosen: Sequence[int],
+    part: int = 1,
+    names: Sequence[str] | None = None,
+    logarithmic: bool = True,
 ) -> CompressedTrajectory:
     """Return chosen frames of a run, compressed.
 
     chosen : increasing indices of frames. part : 1 for all particles; otherwise those whose id is a multiple
         of it. names : quantities for colours; None for all that frames have (see ``quantities``).
+    logarithmic : whether quantities whose values spread over decades have logarithmic scales.
 
     Raise InputError if there are no frames, or if a quantity does not exist.
     """
@@ -119,6 +124,8 @@ def compress(
     for name in names or ():
         must(name in known, "field", f"one of {', '.join(known)}", name)
     wanted = [name for name in known if names is None or name in (*names, "radius", "shape")]
+    for name in () if logarithmic else wanted:
+        survey.ranges[name].linear = True
     columns = _columns(frames, chosen, part, survey, wanted)
     times = np.asarray(frames.times)[list(chosen)]
     return CompressedTrajectory(
@@ -164,6 +171,7 @@ class _Range:
     whole: bool
     finite: bool
     sample: list[np.ndarray]
+    linear: bool = False
 
 
 def _part(frame: Frame, part: int) -> Arrays:
@@ -323,7 +331,7 @@ def _scale(found: _Range, bits: int) -> Scale:
 
 def _spreads(found: _Range) -> bool:
     """Return whether a logarithmic scale suits a quantity."""
-    if not (found.low > 0 and found.high > WIDE_RANGE * found.low):
+    if found.linear or not (found.low > 0 and found.high > WIDE_RANGE * found.low):
         return False
     return float(np.median(np.concatenate(found.sample))) < 0.1 * found.high
 

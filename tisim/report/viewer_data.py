@@ -28,6 +28,7 @@ class ReportOptions:
     contacts : whether to store the contacts of grains.
     pictures : further pictures as PNG, by title.
     checks : rows of text of a table of checks, from ``read_checks``.
+    logarithmic : whether quantities whose values spread over decades have logarithmic scales of colours.
     """
 
     limit: float = SIZE_LIMIT
@@ -35,6 +36,7 @@ class ReportOptions:
     contacts: bool = True
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     checks: Sequence[Sequence[str]] = ()
+    logarithmic: bool = True
 
     def __post_init__(self) -> None:
         must(0.5 <= self.limit < np.inf, "limit", "at least 0.5 MB, and finite", self.limit)
@@ -88,7 +90,7 @@ def recording(
     stride, part = max(1, int(count * particles // room)), 1
     while True:
         chosen = sorted({*range(0, count, stride), count - 1})
-        trajectory = compress(sequence, chosen, part, options.fields)
+        trajectory = compress(sequence, chosen, part, options.fields, options.logarithmic)
         excess = trajectory.size() / room
         if excess <= 1:
             break

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-CORE_SHARE = 0.01
+CORE_SHARE = 0.0075
 """Largest share of one core, averaged over time."""
-CREDIT = 1.0
+CREDIT = 0.5
 """Processor time that may be used at once after a time with less work, s."""
 
 

@@ -80,7 +80,9 @@ class WatchedRun:
     ) -> None:
         """world : index in a batch. options : of the page."""
         self._path, self._world = path, world
-        self._options, self._budget = options or ReportOptions(), budget or Budget()
+        # Parts of a recording must agree in the kind of their scales.
+        self._options = replace(options or ReportOptions(), logarithmic=False)
+        self._budget = budget or Budget()
         self._lock = threading.Lock()
         self._opened: _Opened | None = None
         self._result: tuple[Any, Result | None] = (None, None)
@@ -201,7 +203,7 @@ class WatchedRun:
     ) -> tuple[dict[str, Any], bytes]:
         """Return new frames as a part of a recording, with the points of the curves."""
         some = _Some(opened.scene, [opened.first, *new])
-        trajectory = compress(some, range(1, len(some)), 1, self._options.fields)
+        trajectory = compress(some, range(1, len(some)), 1, self._options.fields, False)
         contacts = self._options.contacts and has_contacts(opened.scene)
         network = contact_network(some, trajectory) if contacts else None
         facts, recording = player_facts(some, trajectory, network)

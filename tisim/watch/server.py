@@ -12,8 +12,10 @@ No path leads to a file: the answers are those of a ``Watched``, by their names.
 
 from __future__ import annotations
 
+import contextlib
 import http.server
 import secrets
+import socket
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -55,7 +57,8 @@ Replies = Mapping[str, Callable[[Mapping[str, str]], Reply]]
 class WatchServer(http.server.ThreadingHTTPServer):
     """A server on the loopback interface. It is a context manager: within it, requests are answered."""
 
-    daemon_threads = True
+    # A thread that is ended within HDF5 at the exit of Python would abort the process.
+    daemon_threads = False
 
     def __init__(self, answers: Replies, port: int = 0) -> None:
         """port : 0 for one that is free.
@@ -64,6 +67,7 @@ class WatchServer(http.server.ThreadingHTTPServer):
         """
         must(0 <= port < 2**16, "port", "0 to 65535", port)
         self.answers, self.token = answers, secrets.token_urlsafe(TOKEN_BYTES)
+        self._connections = set[socket.socket]()
         try:
             super().__init__((LOOPBACK, port), _Handler)
         except OSError as error:
@@ -86,8 +90,20 @@ class WatchServer(http.server.ThreadingHTTPServer):
 
     def __exit__(self, *_: object) -> None:
         self.shutdown()
-        self.server_close()
         self._thread.join()
+        # Browsers keep connections open without a request.
+        for connection in list(self._connections):
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RD)
+        self.server_close()  # waits until answers are complete
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        self._connections.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        super().shutdown_request(request)
+        self._connections.discard(request)
 
     def server_bind(self) -> None:
         # The standard library asks a name server for the name of the machine here, which may take seconds.
