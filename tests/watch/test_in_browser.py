@@ -96,6 +96,7 @@ def test_frames_arrive_without_losing_the_view(growing, watching):
         run.write(3)
         until(page, "report.trajectory.frames === 6")
         assert_shows(page, run)
+        assert page.inner_text("footer p:first-child").startswith("Of the last frames: Positions are shown")
         assert page.evaluate("({ ...report.player.viewer.camera })") == before
         assert page.evaluate("report.player.frame") == 1, "an earlier frame stays"
         assert page.evaluate("report.player.viewer.options.range[1]") == 5
@@ -120,6 +121,7 @@ def test_frames_arrive_without_losing_the_view(growing, watching):
         until(page, "report.trajectory.parts.length === 1")
         assert_shows(page, run)
         assert page.inner_text("p.live") == "The run has ended: 6 frames."
+        assert page.inner_text("footer p:first-child").startswith("Positions are shown to within")
         assert page.text_content("[role=status].unseen") == "The run has ended: 6 frames."
         assert "particle steps" in page.inner_text("#numbers")
         assert page.get_by_role("button", name="Save balances as CSV").count() == 1

@@ -107,7 +107,7 @@ def run_page(
         recording=data.recording,
         notices=[*sentences, *data.notices],
         sections=list(_sections(scene, result, (first, last), options)),
-        footer=[_rounding(data.trajectory), _versions(result)],
+        footer=[rounding(data.trajectory), _versions(result)],
     )
 
 
@@ -240,7 +240,7 @@ def _setting_row(row: Sequence[str], off: bool = False) -> str:
     )
 
 
-def _rounding(trajectory: CompressedTrajectory) -> str:
+def rounding(trajectory: CompressedTrajectory) -> str:
     """Return sentences about the rounding of the quantities shown."""
     position = trajectory.column("position")
     others = [one for one in trajectory.columns if one.name not in ("id", "position", "orientation", "shape")]

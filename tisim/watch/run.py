@@ -27,7 +27,7 @@ from tisim.report.compressed_trajectory import compress
 from tisim.report.contact_network import contact_network, has_contacts
 from tisim.report.kept_frames import KeptFrames
 from tisim.report.page import WATCHED_RUN_SCRIPTS, text_data
-from tisim.report.run_report import RESERVED_BYTES, numbers, result_of, run_page, status_of, summary
+from tisim.report.run_report import numbers, result_of, rounding, run_page, status_of, summary
 from tisim.report.viewer_data import ReportOptions, player_facts
 from tisim.scene.scene import Scene
 from tisim.watch.budget import Budget
@@ -168,40 +168,47 @@ class WatchedRun:
             if after == count - 1:
                 self._read = marks, count
                 return state | {"after": after}
-            return state | self._update(sequence, opened, result, after)
+            if after < 0:
+                return state | self._whole(sequence, result)
+            return state | self._new(sequence, opened, result, after)
 
-    def _update(self, sequence: Frames, opened: _Opened, result: Result | None, after: int) -> dict[str, Any]:
-        """Return the frames after one as plain data."""
-        count, particles = len(sequence), max(len(opened.first.arrays["id"]), 1)
-        if after < 0:
-            kept = KeptFrames(sequence)
-            page = run_page(kept, self._options, result, RESERVED_BYTES)
-            ends, shown, chosen = (kept[0], kept[-1]), len(page.facts["trajectory"]["times"]), []
-            facts, recording = page.facts, page.recording
-        else:
-            most = max(1, int(UPDATE_SECONDS / (self._rate * particles)))
-            stride = -(-(count - 1 - after) // most)
-            chosen = list(range(count - 1, after, -stride))[::-1]
-            began = time.process_time()
-            new = [sequence[k] for k in chosen]
-            facts, recording = self._part(opened, new, chosen)
-            self._rate = (time.process_time() - began) / sum(len(one.arrays["id"]) + 1 for one in new)
-            ends, shown = (opened.first, new[-1]), len(chosen)
-        first, last = (frame.arrays for frame in ends)
-        state, verdict, sentences = status_of(sequence.missing, result)
-        span = float(ends[0].time), float(ends[1].time)
+    def _whole(self, sequence: Frames, result: Result | None) -> dict[str, Any]:
+        """Return all frames as plain data, thinned to the limit."""
+        kept = KeptFrames(sequence)
+        page = run_page(kept, self._options, result)
         return {
-            "facts": facts, "recording": text_data(recording), "after": count - 1, "shown": shown,
+            "facts": page.facts, "recording": text_data(page.recording), "after": len(kept) - 1,
+            "shown": len(page.facts["trajectory"]["times"]), "all": len(kept), "notices": page.notices,
+            "state": page.state, "verdict": page.verdict if self._end else "running",
+            "rounding": page.footer[0], "summary": page.summary,
+            "numbers": numbers(result, (kept[0].arrays, kept[-1].arrays)),
+        }  # fmt: skip
+
+    def _new(self, sequence: Frames, opened: _Opened, result: Result | None, after: int) -> dict[str, Any]:
+        """Return the frames after one as plain data: as many as UPDATE_SECONDS allows, and the last."""
+        count, particles = len(sequence), max(len(opened.first.arrays["id"]), 1)
+        most = max(1, int(UPDATE_SECONDS / (self._rate * particles)))
+        stride = -(-(count - 1 - after) // most)
+        chosen = list(range(count - 1, after, -stride))[::-1]
+        began = time.process_time()
+        new = [sequence[k] for k in chosen]
+        facts, recording, told = self._part(opened, new, chosen)
+        self._rate = (time.process_time() - began) / sum(len(one.arrays["id"]) + 1 for one in new)
+        first, last = opened.first, new[-1]
+        state, verdict, sentences = status_of(sequence.missing, result)
+        ends = len(first.arrays["mass"]), len(last.arrays["mass"])
+        return {
+            "facts": facts, "recording": text_data(recording), "after": count - 1, "shown": len(chosen),
             "all": count, "notices": sentences, "state": state,
-            "verdict": verdict if self._end else "running",
-            "numbers": numbers(result, (first, last)),
-            "summary": summary((len(first["mass"]), len(last["mass"])), count, count, span),
+            "verdict": verdict if self._end else "running", "rounding": told,
+            "summary": summary(ends, count, count, (first.time, last.time)),
+            "numbers": numbers(result, (first.arrays, last.arrays)),
         }  # fmt: skip
 
     def _part(
         self, opened: _Opened, new: Sequence[Frame], chosen: Sequence[int]
-    ) -> tuple[dict[str, Any], bytes]:
-        """Return new frames as a part of a recording, with the points of the curves."""
+    ) -> tuple[dict[str, Any], bytes, str]:
+        """Return new frames as a part of a recording, with the points of the curves, and their rounding."""
         some = _Some(opened.scene, [opened.first, *new])
         trajectory = compress(some, range(1, len(some)), 1, self._options.fields, False)
         contacts = self._options.contacts and has_contacts(opened.scene)
@@ -213,7 +220,8 @@ class WatchedRun:
         for panel in cast(list[dict[str, Any]], panels):
             for curve in panel["curves"]:
                 curve["values"] = curve["values"][1:]
-        return facts | {"series": {"times": tables.digits(times[1:]), "curves": panels}}, recording
+        facts["series"] = {"times": tables.digits(times[1:]), "curves": panels}
+        return facts, recording, rounding(trajectory)
 
     def _file(self) -> Path | None:
         """Return the trajectory, or else the result; None if there is neither."""

@@ -21,7 +21,7 @@ class LiveRun extends Live {
     }
     if (news.ended !== live.ended && news.ended && !all) this.leftOut = true;
     live.ended = news.ended;
-    const count = live.all === 1 ? "one frame" : `${live.all} frames`;
+    const some = report.trajectory.frames, count = live.all === 1 ? "one frame" : `${live.all} frames${some < live.all ? ` (${some} are shown)` : ""}`;
     if (news.ended) this.tell("ended", `The run has ended: ${count}.`);
     else this.tell("running", `Watching: ${count}, the last one ${this.ago(news.age)}.`);
   }
@@ -42,6 +42,7 @@ class LiveRun extends Live {
     status.textContent = news.verdict;
     status.className = `status ${news.state}`;
     document.querySelector(".facts").textContent = news.summary;
+    document.querySelector("footer p").textContent = all ? news.rounding : `Of the last frames: ${news.rounding}`;
     document.getElementById("notices").replaceChildren(...news.notices.map((text) => element("p", { class: `warning ${news.state}` }, text)));
   }
 }
