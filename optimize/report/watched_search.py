@@ -1,7 +1,7 @@
 """The page of a search that is watched, made again from its folder when its files have changed.
 
 Making the page takes longer the more runs the search has. After the first time it waits until that is at most
-a share of one core (see watch/budget.py).
+a share of the cores (see watch/budget.py).
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from tisim.watch.server import Replies, Reply
 from tisim.watch.waiting import POLL, UNREADABLE, waiting_page
 
 SCRIPT = "watch_search.js"
+PAGE_CREDIT = 0.1
+"""Processor time in reserve, s: twice that of a page of 2,000 designs."""
 
 
 class WatchedSearch:
@@ -33,7 +35,7 @@ class WatchedSearch:
     ) -> None:
         """folder : of the search, or its search.h5. options : of the page."""
         self._file = folder / SEARCH_FILE if regular_file.is_folder(folder) else folder
-        self._options, self._budget = options, budget or Budget(credit=0.0)
+        self._options, self._budget = options, budget or Budget(credit=PAGE_CREDIT)
         self._lock = threading.Lock()
         self._made: tuple[str, str] = ("", "")
         self._ended = False

@@ -43,7 +43,7 @@ def watch(
     """Show a run or a search in the browser while it is running: the page of 'tisim report', kept up to date.
 
     The page is served to this machine alone, at an address with a random token, until Ctrl-C. Nothing is
-    written. After the first page it takes at most 1 % of one core.
+    written. After the first page it takes less than 1 % of the cores.
     """
     from tisim.watch.server import WatchServer
 

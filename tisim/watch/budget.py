@@ -6,8 +6,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-CORE_SHARE = 0.0075
-"""Largest share of one core, averaged over time."""
+from tisim.backend import runtime
+
+CORES_SHARE = 0.008
+"""Largest share of all cores together, averaged over time. A run that uses all of them is slowed by it; one
+that leaves a core idle is not."""
 CREDIT = 0.5
 """Processor time that may be used at once after a time with less work, s."""
 
@@ -18,17 +21,19 @@ class Budget:
 
     All of the process counts, also answers without news, except work within ``exempt``.
 
+    share : of one core; by default CORES_SHARE of all that this process may use.
     clock, processor : functions that return the time, and the processor time of this process, s.
     """
 
     def __init__(
         self,
-        share: float = CORE_SHARE,
+        share: float | None = None,
         credit: float = CREDIT,
         clock: Callable[[], float] = time.monotonic,
         processor: Callable[[], float] = time.process_time,
     ) -> None:
-        self._share, self._saved = share, credit / share
+        self._share = share or CORES_SHARE * runtime.cores()
+        self._saved = credit / self._share
         self._clock, self._processor = clock, processor
         self._counted, self._allowed = processor(), clock() - self._saved
 

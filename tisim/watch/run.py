@@ -1,7 +1,7 @@
 """The page of a run that is watched, and the frames that are new since a browser has last asked.
 
 A trajectory can be read while it grows (see io/trajectory.py). Of a run without one, the page waits for the
-result. After the first page, reading and compressing take at most a share of one core (see budget.py): if
+result. After the first page, reading and compressing take at most a share of the cores (see budget.py): if
 frames come faster, only some of them are shown, the last one included. Once the run has ended, the browser
 asks for all.
 """
