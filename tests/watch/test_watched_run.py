@@ -78,7 +78,8 @@ def test_new_frames_arrive_and_the_end_is_told(growing, tmp_path, unlimited):
     assert (news["after"], news["shown"], news["all"]) == (4, 2, 5)
     assert (news["ended"], news["verdict"]) == ("", "running")
     assert news["summary"].startswith("Particles: 40. Frames: 5, from t = 0 s to 0.04 s")
-    assert "The run has come to t = 0.04 s of 1 s" in news["notices"][0]
+    assert news["notices"] == ["The run has come to t = 0.04 s of 1 s."]
+    assert "The run has come to t = 0.02 s of 1 s." in text_of(page).splitlines()
     assert "momentum along x" in news["numbers"]
     run.write()
     run.end()

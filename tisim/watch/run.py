@@ -26,7 +26,7 @@ from tisim.report import tables
 from tisim.report.compressed_trajectory import compress
 from tisim.report.contact_network import contact_network, has_contacts
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.page import WATCHED_RUN_SCRIPTS, text_data
+from tisim.report.page import WATCHED_RUN_SCRIPTS, Page, text_data
 from tisim.report.run_report import numbers, result_of, rounding, run_page, status_of, summary
 from tisim.report.viewer_data import ReportOptions, player_facts
 from tisim.scene.scene import Scene
@@ -36,8 +36,9 @@ from tisim.watch.waiting import POLL, UNREADABLE, waiting_page
 
 UPDATE_SECONDS = 0.05
 """Processor time of an update that is aimed at, s; it always has one frame."""
-FIRST_RATE = 1e-6
-"""Processor time for a particle in a frame, assumed before it is measured, s."""
+FIRST_RATE, MANY_FRAMES = 3e-6, 20
+"""Processor time for a particle in a frame, assumed before it is measured, s; and the number of frames from
+which on the first page is a measurement."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,11 @@ class _Some:
 
     def __iter__(self) -> Iterator[Frame]:
         return iter(self._frames)
+
+
+def _reached(sequence: Frames) -> str:
+    reached, end = float(sequence.times[-1]), sequence.scene.duration
+    return f"The run has come to t = {reached:.6g} s of {end:.6g} s."
 
 
 class WatchedRun:
@@ -117,15 +123,15 @@ class WatchedRun:
                 return waiting_page(
                     self._path, f"The run cannot be read at this moment: {failure}.", "watch.js"
                 )
-            # Mostly imports and the text of the scene, if there are few frames.
-            self._rate = min(FIRST_RATE, (time.process_time() - began) / max(values, 1))
+            # Of few frames, imports and the text of the scene take most of the time.
+            if len(sequence) >= MANY_FRAMES and values:
+                self._rate = (time.process_time() - began) / values
         live = self._state(file) | {
             "key": opened.key, "after": len(sequence) - 1, "poll": POLL, "all": len(sequence),
         }  # fmt: skip
-        verdict = page.verdict if live["ended"] else "running"
+        page = self._going_on(page, sequence)
         return replace(
             page,
-            verdict=verdict,
             facts=page.facts | {"live": live},
             scripts=WATCHED_RUN_SCRIPTS,
             connects=True,
@@ -175,11 +181,11 @@ class WatchedRun:
     def _whole(self, sequence: Frames, result: Result | None) -> dict[str, Any]:
         """Return all frames as plain data, thinned to the limit."""
         kept = KeptFrames(sequence)
-        page = run_page(kept, self._options, result)
+        page = self._going_on(run_page(kept, self._options, result), sequence)
         return {
             "facts": page.facts, "recording": text_data(page.recording), "after": len(kept) - 1,
             "shown": len(page.facts["trajectory"]["times"]), "all": len(kept), "notices": page.notices,
-            "state": page.state, "verdict": page.verdict if self._end else "running",
+            "state": page.state, "verdict": page.verdict,
             "rounding": page.footer[0], "summary": page.summary,
             "numbers": numbers(result, (kept[0].arrays, kept[-1].arrays)),
         }  # fmt: skip
@@ -196,14 +202,22 @@ class WatchedRun:
         self._rate = (time.process_time() - began) / sum(len(one.arrays["id"]) + 1 for one in new)
         first, last = opened.first, new[-1]
         state, verdict, sentences = status_of(sequence.missing, result)
+        if not self._end:
+            verdict, sentences = "running", [_reached(sequence)]
         ends = len(first.arrays["mass"]), len(last.arrays["mass"])
         return {
             "facts": facts, "recording": text_data(recording), "after": count - 1, "shown": len(chosen),
             "all": count, "notices": sentences, "state": state,
-            "verdict": verdict if self._end else "running", "rounding": told,
+            "verdict": verdict, "rounding": told,
             "summary": summary(ends, count, count, (first.time, last.time)),
             "numbers": numbers(result, (first.arrays, last.arrays)),
         }  # fmt: skip
+
+    def _going_on(self, page: Page, sequence: Frames) -> Page:
+        """Return the page with the words of a run that goes on, if it does."""
+        if self._end:
+            return page
+        return replace(page, verdict="running", notices=[_reached(sequence), *page.notices[1:]])
 
     def _part(
         self, opened: _Opened, new: Sequence[Frame], chosen: Sequence[int]
