@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from tisim.engine.assembly import measured
 from tisim.engine.result import Result
 from tisim.errors import InputError, RunError
 from tisim.files import pictures
-from tisim.io.reader import RecordedTrajectory, RecordedWorld
+from tisim.io.reader import Frames, RecordedTrajectory, RecordedWorld
 from tisim.notebook import CELL_DOTS_PER_INCH, card, card_picture, card_table
 from tisim.plotting.style import si, superscripts
 from tisim.report import tables
@@ -159,4 +159,5 @@ def _clouds(result: Result) -> Figure:
 def _curves(world: RecordedWorld) -> Figure:
     from tisim.plotting.time_series import quantities
 
-    return quantities(world)
+    # The function asks for a scene, times and frames alone.
+    return quantities(cast(Frames, world))

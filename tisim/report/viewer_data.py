@@ -51,7 +51,7 @@ class ViewerData:
     """
 
     trajectory: CompressedTrajectory
-    facts: Mapping[str, Any]
+    facts: dict[str, Any]
     recording: bytes
     notices: Sequence[str] = ()
 
@@ -71,7 +71,7 @@ def player_facts(
 ) -> tuple[dict[str, object], bytes]:
     """Return what a browser needs to play a run: plain data, and the compressed frames."""
     parts = [one.data for one in trajectory.columns] + ([network.data()] if network is not None else [])
-    facts = {
+    facts: dict[str, object] = {
         "name": sequence.scene.name, "trajectory": trajectory.facts(), "lengths": [len(one) for one in parts],
         "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
         "materials": list(sequence.scene.materials),

@@ -132,7 +132,7 @@ class WatchedRun:
         page = self._going_on(page, sequence)
         return replace(
             page,
-            facts=page.facts | {"live": live},
+            facts={**page.facts, "live": live},
             scripts=WATCHED_RUN_SCRIPTS,
             connects=True,
         ).html()
