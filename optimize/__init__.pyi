@@ -55,6 +55,7 @@ from .problem.statistic import (
 from .problem.statistic import (
     WorstOf as WorstOf,
 )
+from .report.search_page import search_report as search_report
 from .search_file import SearchFile as SearchFile
 from .search_file import read as read
 from .session import run as run

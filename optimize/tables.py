@@ -217,7 +217,7 @@ def searched_designs(
     for k, constraint in enumerate(constraints):
         add(k, constraint.name, 1.0, limited, again_limited)
     reported = zip(of_all, limited, again_limited, strict=True)
-    facts = {
+    facts: dict[str, list[Any]] = {
         "gen": list(generations.values()),
         "rank": [rank for rank, _ in found],
         "best": [int(one is not None and one is best) for _, one in found],

@@ -95,8 +95,10 @@ def streamlines(scene: Scene, unit: float) -> np.ndarray:
     side = (np.arange(STREAMLINES) + 0.5) / STREAMLINES
     x, y = np.meshgrid(low[0] + side * (high - low)[0], low[1] + side * (high - low)[1])
     place = np.stack([x.ravel(), y.ravel(), np.full(x.size, low[2] - 2 * unit)], axis=1)
-    points, step = [place], LINE_STEP * unit
+    step = LINE_STEP * unit
     with FieldSampler(scene.effects, FLOW) as flow:
+        # Nothing flows outside a tube.
+        points = [place[flow(place)[0].any(axis=1)]]
         for _ in range(int((high[2] - low[2] + 4 * unit) / step * 1.3)):
             # The midpoint rule, with steps of equal length.
             half = points[-1] + 0.5 * step * _direction(flow, points[-1])

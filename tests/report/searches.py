@@ -2,10 +2,16 @@
 
 import numpy as np
 
-from tisim import InputError, optimize
+from tisim import InputError
 from tisim.optimize import Choice, DesignConstraint, Gene, Objective, Problem, ResultConstraint
+from tisim.optimize.beginning import Beginning
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.problem.given_genes import FixedGene
 from tisim.optimize.report.search_data import RunOfDesign, SearchData
+from tisim.optimize.search import search
+from tisim.optimize.search_folder import SEARCH_FILE, results_of
+from tisim.optimize.settings import Settings
+from tisim.optimize.storage.cache import Cache
 from tisim.optimize.tables import FRESH_STARTS, HIGH, LOW, error_of
 
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='hacked=1'>&amp;\u2028${title}"
@@ -47,10 +53,15 @@ def problem(*names, **fields):
     )  # fmt: skip
 
 
-def searched(folder, *names, **settings):
-    """The outcome of a short search in a folder."""
+def searched(folder, *names, start_from=None, **settings):
+    """The outcome of a short search in a folder, without its pictures."""
     chosen = {"generations": 2, "options": {"population": 8}, "ensemble": {"confirm": 4, "select": 2}}
-    return optimize.run(problem(*names), out=folder, **chosen | settings)
+    asked = problem(*names)
+    beginning = Beginning.of(asked, None if start_from is None else [dict(start_from)], None, False)
+    with Cache(folder / SEARCH_FILE) as cache:
+        outcome = search(asked, FunctionEvaluator(), cache, Settings(**chosen | settings), beginning)
+    with results_of(folder, outcome.name):
+        return outcome
 
 
 def made_up(count, rng, objectives=("loss", "mass")):

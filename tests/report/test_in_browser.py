@@ -36,6 +36,11 @@ READ_PICKED = """() => {
   return { counts, metres: viewer.metresPerPixel() };
 }"""
 """The number of pixels of each body, and the length of a pixel."""
+FOCUSED = (
+    "(({ ariaLabel, labels, innerText }) => (ariaLabel || labels?.[0]?.innerText || innerText || '')"
+    ".trim().split('\\n')[0])(document.activeElement)"
+)
+"""The name of the element that has the focus."""
 PIXELS = "document.querySelector('canvas').toDataURL()"
 
 
@@ -175,10 +180,7 @@ def test_the_keyboard_reaches_everything(moving, opened):
         order = []
         for _ in range(40):
             page.keyboard.press("Tab")
-            name = page.evaluate(
-                "(({ ariaLabel, labels, innerText }) => (ariaLabel || labels?.[0]?.innerText || innerText)"
-                ".trim().split('\\n')[0])(document.activeElement)"
-            )
+            name = page.evaluate(FOCUSED)
             assert name, page.evaluate("document.activeElement.outerHTML")
             order.append(name)
         wanted = (

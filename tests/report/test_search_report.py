@@ -3,6 +3,7 @@
 import html
 import json
 import re
+import tomllib
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from tests.cli.conftest import tisim  # noqa: F401
 from tests.report.searches import GENES, HOSTILE, HOSTILE_CHOICE, HOSTILE_NAME, made_up, problem, searched
 from tests.report.test_run_report import facts_of
-from tisim import InputError, optimize
+from tisim import InputError, Scene, optimize, run
 from tisim.cli.search import problem_of
 from tisim.optimize import Gene, Objective, Problem, Quantile
 from tisim.optimize.report.recorded_designs import best_designs, check_problem, record
@@ -49,7 +50,9 @@ def test_the_page_has_all_designs_as_the_search_knows_them(which, request):
     points = list(outcome.generations)
     known = {**outcome.estimates, **outcome.failures}
     assert set(points) == set(known)
-    assert designs["gen"] == list(outcome.generations.values())
+    new = np.bincount(designs["gen"], minlength=len(outcome.logbook))
+    assert new.tolist() == outcome.logbook.select("designs")
+    assert designs["gen"] == sorted(designs["gen"])
     hall = {tuple(individual): individual for individual in outcome.hall}
     decoded = [outcome.problem.genome.decode(point) for point in points]
     assert [one["name"] for one in designs["genes"]] == [gene.name for gene in GENES]
@@ -106,7 +109,7 @@ def test_the_runs_of_a_design_are_those_of_its_mean(two):
 
 def test_runs_of_other_searches_are_not_counted(tmp_path):
     first = searched(tmp_path, "gain", generations=0, seed=1)
-    again = searched(tmp_path, "gain", generations=0, seed=2, starting_designs=[dict(first.designs[0].genes)])
+    again = searched(tmp_path, "gain", generations=0, seed=2, start_from=first.designs[0].genes)
     data = read_search(tmp_path)
     assert data.name == again.name.removeprefix("searches/")
     assert search_names(tmp_path) == sorted(one.name.removeprefix("searches/") for one in (first, again))
@@ -257,3 +260,31 @@ def test_the_command_of_a_search_is_kept(tisim, own_file):  # noqa: F811
     facts, text = facts_of(search_report("s", "t.html"))
     assert facts["command"] == f"tisim optimize {file} --generations 1 --population 4 --fix y=0.5"
     assert facts["command"] in text
+
+
+@pytest.mark.long
+def test_the_best_designs_of_a_case_are_run_for_their_clouds(tisim, tmp_path):  # noqa: F811
+    words = ("agglomeration", "--size", "small", "--generations", 0, "--population", 5, "--out", "s")
+    assert tisim("optimize", *words, "--set", "search.ensemble.confirm=4")[0] == 0
+    assert tisim("report", "s", "--designs", 2)[0] == 0
+    facts, text = facts_of(tmp_path / "s/report.html")
+    data = read_search("s")
+    chosen = best_designs(data, 2)
+    assert [one["design"] for one in facts["recordings"]] == chosen
+    assert facts["command"].startswith("tisim optimize agglomeration --size small --generations 0")
+    assert "Start and end" in text
+    asked = Scene.from_toml("s/best_scene.toml")
+    for one in facts["recordings"]:
+        scene = Scene.from_dict(tomllib.loads(facts["scenes"][str(one["design"])]))
+        assert scene.seed == data.runs[one["design"]][0].seed
+        frames = one["trajectory"]
+        assert frames["times"][0] == 0
+        assert frames["times"][-1] == pytest.approx(scene.duration)
+        assert frames["counts"][0] == scene.particles.number
+    best = Scene.from_dict(tomllib.loads(facts["scenes"][str(chosen[0])]))
+    assert best.digest() == asked.digest()
+    # Its particles at the end are those of an own run.
+    result = run(best)
+    assert facts["recordings"][0]["trajectory"]["counts"][-1] == len(result.state["id"])
+    assert tisim("report", "s")[0] == 0
+    assert facts_of(tmp_path / "s/report.html")[0]["recordings"] == []

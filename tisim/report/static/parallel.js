@@ -1,13 +1,15 @@
 /* Parallel coordinates: an axis for each quantity, a line for each design; parts of axes are chosen by drawing. */
 
+const LEAST_SPACING = 58;         // of axes; a narrow page scrolls
 const TOP = 42, BOTTOM = 26, GRAB = 18, FAINT = 0.1;
+const ROUGH_LINES = 400;        // lines that are drawn while a part is being chosen
 
 class Parallel extends Plot {
   /** axes : for each quantity the facts of its axis and values, number (its column). model :
       colour(k) : CSS; order(k) : higher is drawn later; chosen(); choose(k); describe(k);
       included(k) : whether a line is within all chosen parts; brushed() : called when these have changed. */
   constructor(place, options, axes, model) {
-    super(place, { height: 380, ...options, label: `${options.title}. The parts of the axes are also fields below.` });
+    super(place, { height: 380, least: LEAST_SPACING * axes.length, ...options, label: `${options.title}. The parts of the axes are also fields below.` });
     this.model = model;
     this.over = -1;
     this.axes = axes.map(({ facts, values }) => ({ axis: new Axis(facts, values), values, brush: null }));
@@ -58,6 +60,10 @@ class Parallel extends Plot {
   brush(at, part) {
     const one = this.axes[at];
     one.brush = part;
+    // A part of the lines is drawn until the choice rests for a moment.
+    this.rough = true;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => { this.rough = false; this.repaint(); }, 150);
     if (one.inputs) one.inputs.forEach((input, end) => { input.value = part ? number(part[end], 4) : ""; });
     else one.boxes.forEach((box, k) => { box.firstChild.checked = !part || part.includes(k); });
     this.model.brushed();
@@ -77,7 +83,8 @@ class Parallel extends Plot {
 
   arrange() {
     const n = this.axes.length, side = Math.min(60, 0.5 * this.wide / n);
-    this.x = this.axes.map((_, at) => (n > 1 ? side + at * (this.wide - 2 * side) / (n - 1) : this.wide / 2));
+    this.spacing = n > 1 ? (this.wide - 2 * side) / (n - 1) : this.wide;
+    this.x = this.axes.map((_, at) => (n > 1 ? side + at * this.spacing : this.wide / 2));
   }
 
   y(axis, value) {
@@ -92,12 +99,14 @@ class Parallel extends Plot {
     this.order ??= [...this.axes[0].values.keys()].sort((a, b) => this.model.order(a) - this.model.order(b));
     this.drawOthers(pen, colours);
     const some = this.order.filter((k) => this.model.included(k)), alpha = Math.max(0.25, Math.min(0.9, 150 / some.length));
-    for (const k of some) pen.line(this.places(k), { stroke: this.model.colour(k), width: 1.2, alpha });
+    const step = this.rough ? Math.ceil(some.length / ROUGH_LINES) : 1;
+    for (const k of some.filter((_, m) => m % step === 0)) pen.line(this.places(k), { stroke: this.model.colour(k), width: 1.2, alpha });
     this.axes.forEach(({ axis, brush }, at) => {
       const x = this.x[at], { label, ticks } = axis.ticks(5), end = at === 0 ? "start" : at === this.axes.length - 1 ? "end" : "middle";
       pen.line([[x, TOP], [x, this.high - BOTTOM]], { stroke: colours.ink, width: 1.2 });
-      // Long names would run into each other; every second one stands lower.
-      pen.text(at === 0 ? 4 : end === "end" ? this.wide - 4 : x, this.names(at) ? 14 : 30, label, { fill: colours.ink, anchor: end, bold: true });
+      // Long names would run into each other: every second one stands lower, and ends early.
+      const letters = Math.floor((end === "middle" ? 1.9 : 1.4) * this.spacing / 7.2), name = label.length > letters ? `${label.slice(0, letters - 1)}\u2026` : label;
+      pen.text(at === 0 ? 4 : end === "end" ? this.wide - 4 : x, at % 2 ? 30 : 14, name, { fill: colours.ink, anchor: end, bold: true });
       for (const [value, text] of ticks) {
         const place = axis.place(value);
         if (place < -1e-9 || place > 1 + 1e-9) continue;
@@ -131,10 +140,6 @@ class Parallel extends Plot {
     }
     pen.context.globalAlpha = 1;
     pen.context.drawImage(this.faint.canvas, 0, 0, this.wide, this.high);
-  }
-
-  names(at) {
-    return at % 2 === 0;
   }
 
   drawAbove(pen, colours) {
@@ -208,6 +213,11 @@ class Parallel extends Plot {
 
   tell(number, all) {
     this.told.textContent = number === all ? `${all} designs` : `${number} of ${all} designs within the chosen parts`;
+  }
+
+  whole(pen) {
+    this.rough = false;
+    super.whole(pen);
   }
 
   rows() {

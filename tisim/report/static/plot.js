@@ -165,7 +165,7 @@ function inks() {
 
 /** A figure with a canvas, and above it a canvas for all that follows the pointer. */
 class Plot {
-  /** options : title, file (name), height, label (for screen readers). */
+  /** options : title, file (name), height, label (for screen readers), perhaps the least width. */
   constructor(place, options) {
     Object.assign(this, { options, wide: 0, high: options.height });
     this.canvas = element("canvas", { class: "plot", "aria-hidden": "true" });
@@ -188,10 +188,9 @@ class Plot {
   }
 
   resize() {
-    const wide = this.canvas.parentNode.clientWidth;
-    if (!wide || wide === this.wide) return;
+    const room = this.canvas.parentNode.clientWidth, wide = Math.max(room, this.options.least ?? 0);
+    if (!room || wide === this.wide) return;
     this.wide = wide;
-    this.high = this.options.square ? Math.min(wide, this.options.height) : this.options.height;
     for (const canvas of [this.canvas, this.above]) {
       Object.assign(canvas, { width: wide * devicePixelRatio, height: this.high * devicePixelRatio });
       Object.assign(canvas.style, { width: `${wide}px`, height: `${this.high}px` });

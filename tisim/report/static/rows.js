@@ -1,12 +1,12 @@
 /* A table of thousands of rows: sorted by any column, one page of it in the document at a time. */
 
-const PAGE_ROWS = 50;
+const PAGE_ROWS = 25;
 
 class RowTable {
   /** columns : head, number (whether its cells are), value(k) for sorting and files, text(k) for cells.
-      options : file, label, chosen() : row or -1, choose(k). */
+      options : file, label, chosen() : row or -1, choose(k), by : column of the order at first. */
   constructor(place, count, columns, options) {
-    Object.assign(this, { count, columns, options, page: 0, by: 0, falling: false });
+    Object.assign(this, { count, columns, options, page: 0, by: options.by ?? 0, falling: false });
     this.shown = null;
     this.head = element("tr", {}, ...columns.map((one, k) => element("th", { scope: "col", class: one.number ? "number" : null },
       element("button", { type: "button", class: "sort", onclick: () => this.sort(k) }, one.head))));

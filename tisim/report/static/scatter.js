@@ -86,7 +86,7 @@ class Scatter extends Plot {
   mark(pen, k, style) {
     const place = this.at(k);
     if (!place) return;
-    const [x, y] = place, bar = { stroke: style.bar ?? style.stroke ?? style.fill, width: 1, alpha: 0.8 };
+    const [x, y] = place, bar = { stroke: style.bar ?? style.stroke ?? style.fill, width: 1, alpha: 0.8 * (style.alpha ?? 1) };
     const xBar = this.model.xBar(k), yBar = this.model.yBar(k);
     if (xBar) pen.line([[this.px(xBar[0]), y], [this.px(xBar[1]), y]], bar);
     if (yBar) pen.line([[x, this.py(yBar[0])], [x, this.py(yBar[1])]], bar);

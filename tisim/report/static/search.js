@@ -274,7 +274,7 @@ class SearchPage {
     this.pairChoice(id("pair-choice"));
     this.pairs(id("pairs"));
     this.table = new RowTable(id("rows"), designs.count, designColumns(designs, facts),
-      { file: `${this.file}_designs`, label: "designs", chosen: () => designs.chosen, choose: (k) => designs.choose(k) });
+      { file: `${this.file}_designs`, label: "designs", by: 1, chosen: () => designs.chosen, choose: (k) => designs.choose(k) });
     const panel = new Panel(id("chosen"), facts, designs, this.table);
     this.clouds = facts.recordings.length ? new Clouds(id("views"), facts, bytes) : null;
     const bar = id("shown");
@@ -394,11 +394,14 @@ class SearchPage {
       designs.included[k] = this.parallel.within(k);
       if (designs.included[k]) inside.push(k);
     }
-    // The table follows when the pointer rests.
-    clearTimeout(this.filtering);
-    this.filtering = setTimeout(() => this.table.filter(inside.length < designs.count ? inside : null), 80);
     this.tell();
-    for (const plot of [...this.plots, ...this.pairPlots, this.parallel]) plot.repaint();
+    this.parallel.repaint();
+    // The table and the other plots follow when the pointer rests.
+    clearTimeout(this.following);
+    this.following = setTimeout(() => {
+      this.table.filter(inside.length < designs.count ? inside : null);
+      for (const plot of [...this.plots, ...this.pairPlots]) plot.repaint();
+    }, 100);
   }
 
   tell() {
