@@ -8,7 +8,7 @@ from tisim.notebook import CELL_DOTS_PER_INCH, card, card_picture, card_table
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.report.report import shown_designs
 
-MOST_DESIGNS = 5
+DESIGNS_IN_CELL = 5
 """Largest number of designs in a cell."""
 
 
@@ -18,7 +18,7 @@ def outcome_cell(outcome: Outcome) -> str:
     problem, notes = outcome.problem, list[str]()
     html = []
     if outcome.hall:
-        html.append(card_table(*shown_designs(outcome, MOST_DESIGNS)))
+        html.append(card_table(*shown_designs(outcome, DESIGNS_IN_CELL)))
         try:
             with pictures.drawing("the search"):
                 from tisim.optimize.report.convergence import convergence_figure

@@ -52,7 +52,7 @@ def watching(browser, tmp_path, monkeypatch, unlimited):
                 context.close()
 
     yield show
-    assert [one for one in problems if "ERR_CONNECTION_REFUSED" not in one] == []
+    assert [one for one in problems if "net::ERR_" not in one] == []
 
 
 def shown(page):
