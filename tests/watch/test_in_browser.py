@@ -7,6 +7,7 @@ import pytest
 
 from tests.report.test_in_browser import READ_PICKED, until
 from tisim.engine.result import Status
+from tisim.io.reader import Frame
 from tisim.optimize.report import watched_search
 from tisim.report.page import static
 from tisim.watch import run as module
@@ -15,6 +16,17 @@ from tisim.watch.run import WatchedRun
 from tisim.watch.server import WatchServer
 
 pytestmark = pytest.mark.long
+PICKED_PIXELS = """() => {
+  const { viewer } = report.player, { gl } = viewer;
+  viewer.draw(1);
+  const { width, height, buffer } = viewer.image, pixels = new Uint32Array(width * height);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+  gl.readBuffer(gl.COLOR_ATTACHMENT1);
+  gl.readPixels(0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, pixels);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  return pixels;
+}"""
+"""The row, plus one, of the particle at each pixel."""
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='hacked=1'>&amp;"
 
 
@@ -127,6 +139,47 @@ def test_frames_arrive_without_losing_the_view(growing, watching):
         assert page.get_by_role("button", name="Save balances as CSV").count() == 1
         assert page.evaluate("({ ...report.player.viewer.camera })") == before
         assert page.evaluate("window.hacked ?? 0") == 0
+
+
+def test_the_picture_is_of_the_part_that_has_the_frame(growing, watching):
+    """Particles come and go between parts, each with rows of its own."""
+    run = growing(n=3)
+    places = {0: [-6e-3, 0, 0], 1: [0, 0, 0], 2: [6e-3, 0, 0]}
+
+    def write(*ids):
+        arrays = {name: values[list(ids)] for name, values in run.arrays(run.count).items()}
+        arrays["position"] = np.array([places[one] for one in ids])
+        run.file.write(0, Frame(0.01 * run.count, run.count, arrays))
+        run.count += 1
+
+    def centres(frame):
+        """The mean horizontal place (m) of the pixels of each particle in a frame, by id."""
+        found = page.evaluate(
+            "(frame) => { const { player, trajectory } = report; player.viewer.look(-Math.PI / 2, 0);"
+            f" player.go(frame); const pixels = ({PICKED_PIXELS})(), sums = {{}};"
+            " pixels.forEach((one, k) => { if (!one || one >= 0x40000000) return;"
+            " const id = trajectory.id(frame, one - 1), sum = sums[id] ??= [0, 0];"
+            " sum[0] += k % player.viewer.image.width + 0.5; sum[1]++; });"
+            " const { width } = player.viewer.image, metres = player.viewer.metresPerPixel();"
+            " return Object.entries(sums).map(([id, [x, n]]) => [id, (x / n - width / 2) * metres]); }",
+            frame,
+        )
+        return {int(one): x for one, x in found}
+
+    write(0)
+    with watching() as (page, _):
+        page.evaluate("report.player.viewer.set({ flat: true })")
+        given = [(0,)]
+        for ids in ((0, 1, 2), (2,), (1, 2)):
+            write(*ids)
+            given.append(ids)
+            until(page, f"report.trajectory.frames === {run.count}")
+        assert page.evaluate("report.trajectory.parts.length") == 4
+        for frame in (0, 1, 2, 3, 1, 0, 3):
+            seen = centres(frame)
+            assert sorted(seen) == list(given[frame])
+            for one, x in seen.items():
+                assert x == pytest.approx(places[one][0], abs=3e-4)
 
 
 def test_a_page_waits_for_a_run_and_shows_its_failure(growing, watching):
