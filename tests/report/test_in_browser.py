@@ -14,7 +14,9 @@ from tisim import Open
 from tisim.effects import HardRods, HardSuperquadrics
 from tisim.io.reader import frames
 from tisim.report.compressed_trajectory import compress
-from tisim.report.run_report import ReportOptions, run_report
+from tisim.report.run_report import run_report
+from tisim.report.view import view
+from tisim.report.viewer_data import ReportOptions
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.sources import Cylinder, MagneticCylinders, MagneticSpheres, Sphere
 from tisim.steppers import MechanicalContraction
@@ -117,6 +119,40 @@ def test_the_policy_forbids_connections_and_foreign_scripts(moving, browser):
     page.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=data:, onerror=\"hacked=1\">')")
     page.wait_for_timeout(100)
     assert page.evaluate("window.hacked ?? 0") == 0
+    context.close()
+
+
+def test_a_cell_of_a_notebook_shows_the_viewer_and_cannot_reach_the_notebook(moving, browser, tmp_path):
+    _, path, made = moving
+    notebook = tmp_path / "notebook.html"
+    cell = view(path, height=420)
+    notebook.write_text(f"<!doctype html><body>{cell._repr_html_()}<p id=below>below</p></body>")
+    context = browser.new_context(viewport={"width": 900, "height": 700})
+    page, problems, requests = context.new_page(), [], []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(notebook.as_uri())
+    (frame,) = page.frames[1:]
+    frame.wait_for_selector("html[data-ready=yes]")
+    assert frame.evaluate("report.trajectory.frames") == len(made)
+    assert frame.locator("canvas").bounding_box()["height"] > 250
+    assert not frame.locator("h1").is_visible()
+    page.wait_for_timeout(200)
+    colours = frame.evaluate("report.player.viewer.draw(1), report.player.viewer.image.width")
+    assert colours > 600
+    counts = frame.evaluate(READ_PICKED)["counts"]
+    assert len(counts) > 200, "the particles are drawn"
+    for reach in ("parent.document.title", "localStorage.length", "top.location.href"):
+        assert (
+            frame.evaluate(
+                f"(() => {{ try {{ return String({reach}); }} catch (e) {{ return e.name; }} }})()"
+            )
+            == "SecurityError"
+        )
+    box = page.locator("#below").bounding_box()
+    assert box["y"] >= 420
+    assert problems == []
+    assert [one for one in requests if not one.startswith(("file:", "about:", "data:", "blob:"))] == []
     context.close()
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,14 +21,14 @@ from tisim.cli.options import (
     Threads,
     nameable,
 )
-from tisim.console import err, progress_bar
+from tisim.console import shown_progress
 from tisim.errors import InputError
 from tisim.files import output_folder, pictures, regular_file
 from tisim.files.output_folder import resumes
 from tisim.streams import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from matplotlib.figure import Figure
 
@@ -162,7 +160,7 @@ def figures(
     )
     output_folder.claim(out_folder, (output_folder.LOCK,), overwrite)
     with output_folder.lock(out_folder):
-        with file_progress("running") as progress:
+        with shown_progress("running") as progress:
             results = chosen_case.figures(size_name, progress)
         output_folder.claim(out_folder, results, overwrite)
         # Write numbers first, so that a figure that cannot be drawn does not lose them.
@@ -205,7 +203,7 @@ def movie(
         look = Look.of(colour, view, crop, tuple(clip or ()))
         check(trajectory, path, rate)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
-        with file_progress("drawing") as progress:
+        with shown_progress("drawing") as progress:
             draw(trajectory, path, rate, progress, look)
         print_missing(trajectory.missing)
     print(path)
@@ -236,7 +234,7 @@ def export(
     check(file, kind, names)
     out_folder = folder or file.parent
     output_folder.claim(out_folder, file_names(file, kind), overwrite)
-    with file_progress("writing") as progress:
+    with shown_progress("writing") as progress:
         path = write(file, kind, out_folder, progress, names)
     for world in range(count := world_count(file)):
         with frames(file, world) as trajectory:
@@ -274,11 +272,3 @@ def trajectory_file(path: Path) -> Path:
                 f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
-
-
-@contextmanager
-def file_progress(what: str) -> Iterator[Callable[[float], None]]:
-    """Yield a function that shows a finished fraction as a progress bar on standard error."""
-    with progress_bar("{task.description}", console=err()) as bar:
-        task = bar.add_task(what, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)

@@ -11,9 +11,9 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import targets
-from tisim.cli.inspect import World, case_pictures, file_progress, print_missing, trajectory_file
+from tisim.cli.inspect import World, case_pictures, print_missing, trajectory_file
 from tisim.cli.options import Overwrite, Plugins, given_options, nameable
-from tisim.console import err
+from tisim.console import err, shown_progress
 from tisim.errors import InputError, must
 from tisim.files import output_folder, pictures, regular_file
 from tisim.streams import say
@@ -142,7 +142,8 @@ def _run(
 ) -> None:  # fmt: skip
     from tisim.io.reader import frames
     from tisim.plotting.time_series import mark_missing
-    from tisim.report.run_report import ReportOptions, read_checks, run_report
+    from tisim.report.run_report import read_checks, run_report
+    from tisim.report.viewer_data import ReportOptions
 
     with frames(file, world) as trajectory, pictures.drawing(f"pictures of {file}"):
         found = case_pictures(trajectory) if len(trajectory) > 1 else {}
@@ -191,7 +192,7 @@ def _search(
             arithmetic=evaluator.get("arithmetic", "strict"),
         )  # fmt: skip
         chosen = best_designs(data, designs)
-        with file_progress(f"running {len(chosen)} designs") as progress:
+        with shown_progress(f"running {len(chosen)} designs") as progress:
             recorded = record(data, problem, chosen, limit, progress)
     replace_file(path, search_html(data, SearchPageOptions(limit, texts, recorded)).encode())
 
