@@ -58,7 +58,8 @@ def start_and_end(
     figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
     colours = colouring(scene, states, look.colour)
-    beside = [scenery(scene, states, time, known) for time, known in zip(times, measures, strict=True)]
+    each = zip(states, times, measures, strict=True)
+    beside = [scenery(scene, states, time, known, state) for state, time, known in each]
     part = window(states, beside, look)
     headings = "start", last
     for axis, state, heading, time, around in zip(axes, states, headings, times, beside, strict=True):

@@ -67,7 +67,7 @@ def movie(
         ):
             for k, frame in enumerate(frames):
                 axis.clear()
-                around = scenery(frames.scene, [outermost], frame.time, frame.measures)
+                around = scenery(frames.scene, [outermost], frame.time, frame.measures, frame.arrays)
                 colours = None if coloured is None else coloured.of(frame.arrays)
                 cloud.panel(axis, frame.arrays, part, around, colours, shapes, look, int(SIDE * DPI))
                 cloud.directions(axis, part, cloud.gravity(frames.scene), camera=look.camera)
@@ -133,9 +133,10 @@ def _scales(frames: Frames, look: Look) -> tuple[Colouring | None, Arrays, Windo
     together = {key: np.concatenate([one[key] for one in outermost]) for key in ("position", "radius")}
     surroundings = []
     for k, time in enumerate(frames.times):
-        # Moving walls may extend farther between the first and the last frame.
+        # Moving walls may extend farther between the first and the last frame. Containers only grow.
         known = {key: float(series[k]) for key, series in frames.measures.items()}
-        surroundings.append(scenery(frames.scene, [together], float(time), known))
+        now = grains if k == len(frames) - 1 else None
+        surroundings.append(scenery(frames.scene, [together], float(time), known, now))
     part = window(outermost, surroundings, look)
     return None if name is None else scaled(frames.scene, name, values), together, part
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import colormaps
 
+from tisim.effects.walls.confinement import confinement
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.cloud import gravity
 from tisim.report import bodies
@@ -43,6 +44,9 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         centre = np.array(magnet.centre)
         focus = np.minimum(focus[0], centre - magnet.radius), np.maximum(focus[1], centre + magnet.radius)
     walls = bodies.bodies(scene, trajectory.times, travel, *focus)
+    if confinement(scene) is not None:
+        held = bodies.container(scene, (sequence[k].arrays for k in trajectory.indices.tolist()))
+        walls += [] if held is None else [held]
     # Walls near the particles are in view as a whole, such as the hopper above a bed.
     size = float(np.linalg.norm(focus[1] - focus[0]))
     near = [points for points in (body.places() for body in walls) if _within(points, focus, size)]

@@ -231,7 +231,7 @@ uniform mat4 pose;
 out vec3 at;
 flat out vec3 outward;
 void main() {
-  outward = mat3(view) * mat3(pose) * normal;
+  outward = normalize(mat3(view) * mat3(pose) * normal);
   at = (view * pose * vec4(place, 1.0)).xyz;
   gl_Position = projection * vec4(at, 1.0);
 }`;
@@ -464,7 +464,7 @@ class Viewer {
     const own = this.vertexArray([[0, new Float32Array(places), 3, 0], [1, new Float32Array(normals), 3, 0]]);
     const ends = [];
     for (const k of body.lines) ends.push(...corner(k));
-    return { ...own, count: places.length / 3, lines: this.lines(ends), poses: body.poses };
+    return { ...own, count: places.length / 3, lines: this.lines(ends), poses: body.poses, stretches: body.stretches };
   }
 
   /** ends : three coordinates of both ends of each line, relative. */
@@ -751,6 +751,9 @@ class Viewer {
   pose(body) {
     if (!body?.poses?.length) return Matrix.pose([0, 0, 0, 0, 0, 0, 1]);
     const [a, b, c, ...q] = body.poses.slice(7 * this.frame, 7 * this.frame + 7), turn = Matrix.pose([0, 0, 0, ...q]);
+    body.stretches.slice(3 * this.frame, 3 * this.frame + 3).forEach((longer, k) => {
+      for (let m = 0; m < 3; m++) turn[4 * k + m] *= longer;
+    });
     // From relative coordinates to relative coordinates: R (centre + unit x) + shift.
     const moved = [0, 1, 2].map((m) => turn[m] * this.centre[0] + turn[4 + m] * this.centre[1] + turn[8 + m] * this.centre[2]);
     [a, b, c].forEach((x, m) => { turn[12 + m] = (moved[m] + x - this.centre[m]) / this.unit; });
