@@ -103,18 +103,22 @@ def told() -> dict[str, Told]:
 
 
 def figures(app: Any, doctree: nodes.document) -> None:
-    """Replace the pictures of recordings that are not links by figures."""
+    """Replace the pictures of recordings by figures, except for links and pictures within text."""
     page = app.env.current_document.docname
     known, sections = recordings.every_case(), told()
     for image in list(doctree.findall(nodes.image)):
-        path = Path(image["uri"])
-        if path.parts[-3:-1] != ("_static", "recordings") or isinstance(image.parent, nodes.reference):
+        path, block = Path(image["uri"]), image.parent
+        if path.parts[-3:-1] != ("_static", "recordings"):
+            continue
+        if not (isinstance(block, nodes.paragraph) and len(block) == 1):
+            image["classes"].append("still")
             continue
         one = known[path.stem]
+        for source in (one.script, recordings.SETTINGS, recordings.DOCS / f"{GALLERY}.md"):
+            app.env.note_dependency(str(source))
         uri = "../" * page.count("/") + "/".join(path.parts[-3:])
-        figure = nodes.raw("", figure_html(one, uri, image.get("alt", ""), sections, page), format="html")
-        block = image.parent if isinstance(image.parent, nodes.paragraph) else image
-        block.replace_self(figure)
+        html = figure_html(one, uri, image.get("alt", ""), sections, page)
+        block.replace_self(nodes.raw("", html, format="html"))
 
 
 def figure_html(one: recordings.Recorded, uri: str, alt: str, sections: dict[str, Told], page: str) -> str:
@@ -122,7 +126,7 @@ def figure_html(one: recordings.Recorded, uri: str, alt: str, sections: dict[str
     facts = recordings.facts_of(one.script.read_text(encoding="utf-8"))
     caption = (
         f"<p>Recording of {_code(one.command)}: {escape(recordings.contents(facts))}; "
-        f"{facts['seconds']:.0f} s of CPU time.</p>"
+        f"{facts['seconds']:.0f} s of CPU time. {escape(one.note)}</p>"
     )
     if page != GALLERY:
         section = sections[one.name]
@@ -138,7 +142,8 @@ def figure_html(one: recordings.Recorded, uri: str, alt: str, sections: dict[str
 
 def _code(command: str) -> str:
     """Return a command as HTML whose lines do not break after the hyphens of options."""
-    return f"<code>{re.sub('(--[^ ]+)', r'<span>\\1</span>', escape(command))}</code>"
+    text = re.sub("(--[^ ]+)", r"<span>\1</span>", escape(command))
+    return f"<code>{text}</code>"
 
 
 def add_script(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:

@@ -73,6 +73,7 @@ class Recorded:
     every: float | None = None
     still: float = 1.0
     near: bool = False
+    note: str = ""
 
     @property
     def script(self) -> Path:
