@@ -34,7 +34,7 @@ def resident() -> float:
 
 
 def scenes(number: int, seed: int = 1) -> Iterator[Scene]:
-    """Small scenes, most of them with a structure of their own."""
+    """Small scenes, most of them with a structure of their own. Forces are weak: no step is too long."""
     draw = np.random.Generator(np.random.Philox(seed))
     for _ in range(number):
         n, near, far = (int(k) for k in (draw.integers(2, 40), draw.integers(1, 20), draw.integers(21, 40)))
@@ -42,7 +42,7 @@ def scenes(number: int, seed: int = 1) -> Iterator[Scene]:
             particles=Particles(
                 position=draw.uniform(size=(n, 3)), velocity=np.zeros((n, 3)), radius=0.01, mass=1.0
             ),
-            effects=(NearField(alpha1=1e-9, beta1=near, alpha2=0.0, beta2=far),),
+            effects=(NearField(alpha1=1e-40, beta1=near, alpha2=0.0, beta2=far),),
             stepper=Verlet(control=FixedStep(dt=0.5)),
             duration=1.0,
         )

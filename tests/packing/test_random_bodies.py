@@ -110,7 +110,7 @@ def test_superquadrics_of_a_start_do_not_overlap(shape):
         apart = start.position[:i] - start.position[i]
         apart -= side * np.round(apart / side)
         near = np.flatnonzero(np.linalg.norm(apart, axis=1) < 2 * shape.bounding_radius())
-        gaps += [-contact(shape, apart[j], turns[i], turns[j])[0] for j in near]
+        gaps += [-contact((shape, shape), apart[j], turns[i], turns[j])[0] for j in near]
     assert len(gaps) > 50
     assert min(gaps) > -1e-12
 

@@ -17,5 +17,6 @@ from .outlet import Outlet as Outlet
 from .passage import Passage as Passage
 from .peak_displacement import PeakDisplacement as PeakDisplacement
 from .peak_height import PeakHeight as PeakHeight
+from .reflecting_walls import ReflectingWalls as ReflectingWalls
 from .release import Release as Release
 from .touching_magnets import TouchingMagnets as TouchingMagnets

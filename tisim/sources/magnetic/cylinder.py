@@ -83,7 +83,7 @@ class MagneticCylinders(Magnets):
         le=5,
     )
     sum_box: Corners | None = option(
-        "corners of the box in which the sum is by cells, m; twice the box about all cylinders unless given",
+        "corners of the box in which ``sum_digits`` apply, m; twice the box about all cylinders unless given",
         None,
     )
 
