@@ -6,7 +6,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 import equation_nodes
 import pair_plots
-import recorded_figures
+import recorded_nodes
 import reference_pages
 
 from tisim.version import __version__
@@ -78,4 +78,4 @@ def setup(app):
     app.connect("doctree-read", equation_nodes.set_formulas)
     for node in (equation_nodes.Equations, equation_nodes.Formula):
         app.add_node(node, html=(equation_nodes.visit, None))
-    recorded_figures.setup(app)
+    recorded_nodes.setup(app)

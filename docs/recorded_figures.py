@@ -1,4 +1,4 @@
-"""Pictures of recordings become figures that play them, in the pages that Sphinx builds.
+"""Figures that play the recordings of cases, in the pages that Sphinx builds; recorded_nodes.py inserts them.
 
 A source has the still picture, ``![...](_static/recordings/CASE.webp)``, which is shown wherever the source
 is read. In the built page a button over the picture plays the recording. Below it are the command and the
@@ -12,12 +12,9 @@ import json
 import re
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 from string import Template
-from typing import Any
 
 import recordings
-from docutils import nodes
 
 from tisim.report.page import static
 from tisim.report.scenery import colour_maps
@@ -102,25 +99,6 @@ def told() -> dict[str, Told]:
     return found
 
 
-def figures(app: Any, doctree: nodes.document) -> None:
-    """Replace the pictures of recordings by figures, except for links and pictures within text."""
-    page = app.env.current_document.docname
-    known, sections = recordings.every_case(), told()
-    for image in list(doctree.findall(nodes.image)):
-        path, block = Path(image["uri"]), image.parent
-        if path.parts[-3:-1] != ("_static", "recordings"):
-            continue
-        if not (isinstance(block, nodes.paragraph) and len(block) == 1):
-            image["classes"].append("still")
-            continue
-        one = known[path.stem]
-        for source in (one.script, recordings.SETTINGS, recordings.DOCS / f"{GALLERY}.md"):
-            app.env.note_dependency(str(source))
-        uri = "../" * page.count("/") + "/".join(path.parts[-3:])
-        html = figure_html(one, uri, image.get("alt", ""), sections, page)
-        block.replace_self(nodes.raw("", html, format="html"))
-
-
 def figure_html(one: recordings.Recorded, uri: str, alt: str, sections: dict[str, Told], page: str) -> str:
     """Return the figure of a recording as HTML. uri : of the still picture, from the page."""
     facts = recordings.facts_of(one.script.read_text(encoding="utf-8"))
@@ -144,23 +122,3 @@ def _code(command: str) -> str:
     """Return a command as HTML whose lines do not break after the hyphens of options."""
     text = re.sub("(--[^ ]+)", r"<span>\1</span>", escape(command))
     return f"<code>{text}</code>"
-
-
-def add_script(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Load the script that plays on the pages that have a recording."""
-    if 'class="recording"' in context.get("body", ""):
-        app.add_js_file("recordings.js", loading_method="defer")
-
-
-def write_viewer(app: Any, error: Exception | None) -> None:
-    """Write the script of the viewer beside the recordings of the built pages."""
-    if error is None and app.builder.format == "html":
-        (Path(app.outdir) / "_static" / "viewer.js").write_text(viewer(), encoding="utf-8")
-
-
-def setup(app: Any) -> dict[str, bool]:
-    """Add the figures to the build, as a Sphinx extension."""
-    app.connect("doctree-read", figures)
-    app.connect("html-page-context", add_script)
-    app.connect("build-finished", write_viewer)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
