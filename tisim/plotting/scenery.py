@@ -69,6 +69,13 @@ def box_scenery(low: np.ndarray | None, high: np.ndarray | None) -> Scenery:
     return Scenery(edges=(edges,), points=corners, bounded=True)
 
 
+def wall_scenery(triangles: np.ndarray, edges: np.ndarray) -> Scenery:
+    """Return walls as glass. triangles : m, shape (n, 3, 3). edges : m, shape (k, 2, 3)."""
+    walls = (DrawnTriangles.of(triangles, np.array(WALL_COLOUR)),) if len(triangles) else ()
+    lines = (DrawnLines.of(edges, np.array(EDGE_COLOUR), EDGE_WIDTH),) if len(edges) else ()
+    return Scenery(walls=walls, edges=lines, points=triangles.reshape(-1, 3), bounded=bool(len(triangles)))
+
+
 def scenery(
     scene: Scene,
     states: Sequence[Arrays],
@@ -87,10 +94,11 @@ def scenery(
     placed = placed_walls(scene.effects, time, around, measures, FAR)
     if now is not None and (container := placed_container(scene, now)) is not None:
         placed.append(container)
-    walls = [DrawnTriangles.of(one.triangles, np.array(WALL_COLOUR)) for one in placed if len(one.triangles)]
-    edges = [DrawnLines.of(one.edges, np.array(EDGE_COLOUR), EDGE_WIDTH) for one in placed if len(one.edges)]
-    points = np.concatenate([box.points, *(one.corners.reshape(-1, 3) for one in walls)])
-    return Scenery(tuple(bodies), tuple(walls), (*box.edges, *edges), points, bool(len(points)))
+    each = [box, *(wall_scenery(one.triangles, one.edges) for one in placed)]
+    walls = tuple(part for one in each for part in one.walls)
+    edges = tuple(part for one in each for part in one.edges)
+    points = np.concatenate([one.points for one in each])
+    return Scenery(tuple(bodies), walls, edges, points, bool(len(points)))
 
 
 def _bodies(scene: Scene) -> list[Solids]:
