@@ -23,10 +23,10 @@ from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import panel
-from tisim.plotting.look import Look
+from tisim.plotting.look import FROM_THE_SIDE
 from tisim.plotting.scenery import window
 from tisim.plotting.style import empty, letters, plain
-from tisim.rendering.camera import ALONG_Y, Window
+from tisim.rendering.camera import Window
 from tisim.scene.initial_state import Arrays
 
 SEEDS = 3
@@ -39,8 +39,6 @@ SHOWN = (30.0, 16.0)
 
 AFTER = (0.0, 2.0, 4.0, 6.0, 10.0, 30.0)
 """Times of the pictures after the dividing wall is removed, in sqrt(d/g) (L21 Fig. 4.14)."""
-SIDE = Look(camera=ALONG_Y)
-"""The look of grains in motion."""
 STRIP = 3.0
 """Width of a strip of the column, in diameters."""
 STRIP_COLOURS = ("#4477aa", "#ccbb44", "#228833", "#cc6677")
@@ -180,7 +178,7 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     strips = strips_of(chosen[0].arrays, d)
     figure = empty(11.6, 5.4, pad=0.1)
     axes = figure.subplots(2, 3).ravel()
-    part = window([frame.arrays for frame in chosen], look=SIDE, ratio=1.4)
+    part = window([frame.arrays for frame in chosen], look=FROM_THE_SIDE, ratio=1.4)
     for axis, frame in zip(axes, chosen, strict=True):
         side_view(axis, frame.arrays, strips, part)
         axis.set_title(f"after {max(frame.time - begin, 0.0):.2g} s")
@@ -197,5 +195,5 @@ def strips_of(state: Arrays, d: float) -> dict[int, int]:
 def side_view(axis: Axes, state: Arrays, strips: Mapping[int, int], part: Window) -> None:
     """Draw the grains on the floor as seen along the width of the cell, in the colours of their strips."""
     colours = [to_rgb(STRIP_COLOURS[strips[k] % len(STRIP_COLOURS)]) for k in state["id"].tolist()]
-    panel(axis, state, part, colour=np.array(colours), look=SIDE)
+    panel(axis, state, part, colour=np.array(colours), look=FROM_THE_SIDE)
     axis.axhline(0.0, color="0.4", lw=1.0, zorder=1)

@@ -19,10 +19,9 @@ from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames, frames
 from tisim.plotting.cloud import directions, panel
 from tisim.plotting.clusters import cluster_colours
-from tisim.plotting.look import Look
+from tisim.plotting.look import FROM_THE_SIDE
 from tisim.plotting.scenery import window
 from tisim.plotting.style import empty, letters, plain
-from tisim.rendering.camera import ALONG_Y
 from tisim.scene.initial_state import Arrays
 
 SNAPSHOT: dict[str, Any] = {"number": 125, "duration": 2e-3}
@@ -33,8 +32,6 @@ CURVE_DURATION = 0.6
 """The simulated time that curves span, s."""
 CURVE_REPEATS, CURVE_FRAMES = 2, 90
 """Number of repeats averaged for a curve, and number of its points."""
-SIDE = Look(camera=ALONG_Y)
-"""The look of snapshots."""
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
@@ -61,9 +58,9 @@ def snapshot(axis: Axes, state: Arrays) -> None:
     chain."""
     position, moment, radius = state["position"], state["moment"], float(state["radius"][0])
     chains = labels(len(position), head_to_tail(position, moment, 2 * radius))
-    part = window([state], look=SIDE)
-    panel(axis, state, part, colour=cluster_colours(chains), look=SIDE)
-    directions(axis, part, np.zeros(3), camera=SIDE.camera)
+    part = window([state], look=FROM_THE_SIDE)
+    panel(axis, state, part, colour=cluster_colours(chains), look=FROM_THE_SIDE)
+    directions(axis, part, np.zeros(3), camera=FROM_THE_SIDE.camera)
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:

@@ -16,15 +16,13 @@ from tisim.cases.mrf_shear.morphology import widths
 from tisim.cases.mrf_shear.scene import LARGE_RADIUS, STRAIN
 from tisim.numerics.statistics import half_width
 from tisim.plotting.cloud import directions, panel
-from tisim.plotting.look import Look
+from tisim.plotting.look import FROM_THE_SIDE
 from tisim.plotting.style import empty, letters, plain
-from tisim.rendering.camera import ALONG_Y, Window
+from tisim.rendering.camera import Window
 from tisim.scene.initial_state import Arrays
 
 CHAIN, JOINED, OTHERS = "#cc3311", "#228833", "0.82"
 """Colours of the grains of a chain, of grains to which it attaches itself, and of others."""
-SIDE = Look(camera=ALONG_Y)
-"""The look of chains."""
 SHOWN = (0, FRAMES // 2, FRAMES)
 """Frames that are drawn."""
 MICRONS = 1e6
@@ -103,8 +101,8 @@ def draw_chain(axis: Axes, cell: Followed, frame: int) -> None:
     # The chain is in front of the others, so that it can be seen.
     for grains, colour in ((others, OTHERS), (joined, JOINED), (chain, CHAIN)):
         state = {"position": place[grains], "radius": radius[grains]}
-        panel(axis, state, part, colour=np.tile(to_rgb(colour), (len(grains), 1)), look=SIDE)
-    directions(axis, part, np.zeros(3), camera=SIDE.camera)
+        panel(axis, state, part, colour=np.tile(to_rgb(colour), (len(grains), 1)), look=FROM_THE_SIDE)
+    directions(axis, part, np.zeros(3), camera=FROM_THE_SIDE.camera)
     pairs, shown = cell.pairs(frame), np.concatenate([chain, joined])
     # The contacts of the chain.
     for i, j in pairs[np.isin(pairs, chain).any(axis=1) & np.isin(pairs, shown).all(axis=1)]:

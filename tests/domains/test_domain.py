@@ -136,7 +136,9 @@ def test_the_box_must_be_wide_enough_for_inserted_grains():
     simulation = compiled(filled(1.9, 0.3), 2, 8)
     simulation.load([filled(1.9, 0.3), filled(1.9, 0.3)])
     # 2 (0.4 + 0.4 + 0.4 width).
-    with pytest.raises(InputError, match=r"box must be at least 1\.92 m wide .* range over which far_shell acts"):
+    with pytest.raises(
+        InputError, match=r"box must be at least 1\.92 m wide .* range over which far_shell acts"
+    ):
         simulation.load([filled(1.9, 0.3), filled(1.9, 0.4)])
 
 

@@ -135,8 +135,10 @@ def directions(
 
 
 def _scale_bar(axis: Axes, part: Window) -> None:
-    power = 10.0 ** np.floor(np.log10(part.width / 4))
-    length = power * max(k for k in (1, 2, 5) if k * power <= part.width / 4)
+    # A power of ten is not its own logarithm to the last bit.
+    most = part.width / 4 * (1 + 1e-9)
+    power = 10.0 ** np.floor(np.log10(most))
+    length = power * max(k for k in (1, 2, 5) if k * power <= most)
     x, y = part.left + 0.02 * part.width, part.bottom + 0.015 * part.height
     line = axis.plot([x, x + length], [y, y], color="0.2", lw=2, solid_capstyle="butt", zorder=4)[0]
     middle, above = x + length / 2, y + 0.012 * part.height

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 
 from tisim.errors import must
-from tisim.rendering.camera import USUAL_CAMERA, Camera, ClipPlane
+from tisim.rendering.camera import ALONG_Y, USUAL_CAMERA, Camera, ClipPlane
 
 Crop = tuple[float, float, float, float]
 """Left, right, bottom and top of a part of a picture, 0..1."""
@@ -78,3 +78,5 @@ def _plane(text: str) -> ClipPlane:
 
 USUAL = Look()
 """How pictures show a scene unless asked otherwise."""
+FROM_THE_SIDE = Look(camera=ALONG_Y)
+"""A picture as seen along y."""
