@@ -62,6 +62,10 @@ Clip = Annotated[
     list[str] | None,
     typer.Option(metavar="PART", help="Part of space that is drawn, in m, such as 'y<0.01'; repeatable."),
 ]
+Lines = Annotated[
+    str | None,
+    typer.Option(metavar="FIELD", help="Field whose lines are drawn: magnetic, electric or flow."),
+]
 IntoFolder = Annotated[
     Path | None,
     typer.Option(
@@ -80,6 +84,7 @@ def plot(
     view: View = "",
     crop: Crop = "",
     clip: Clip = None,
+    lines: Lines = None,
 ) -> None:
     """Draw pictures of a run.
 
@@ -94,7 +99,7 @@ def plot(
         with pictures.drawing(f"{file}"):
             from tisim.plotting.look import Look
 
-            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ())))
+            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ()), lines))
         _print_missing(trajectory.missing)
     output_folder.claim(out_folder, drawn, overwrite)
     for name, figure in drawn.items():
@@ -249,6 +254,7 @@ def movie(
     view: View = "",
     crop: Crop = "",
     clip: Clip = None,
+    lines: Lines = None,
 ) -> None:
     """Draw the trajectory of a run as a moving picture.
 
@@ -263,7 +269,7 @@ def movie(
         from tisim.plotting.movie import check, while_drawn
         from tisim.plotting.movie import movie as draw
 
-        look = Look.of(colour, view, crop, tuple(clip or ()))
+        look = Look.of(colour, view, crop, tuple(clip or ()), lines)
         check(trajectory, path, rate)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with _progress("drawing") as progress:

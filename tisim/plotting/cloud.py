@@ -13,6 +13,7 @@ from tisim.effects.external.gravity import Gravity
 from tisim.engine.result import Result
 from tisim.plotting.bodies import shapes_of, solids_of
 from tisim.plotting.colours import colouring, plain_colours
+from tisim.plotting.field_lines import FieldLines
 from tisim.plotting.image import PIXELS, draw_solids
 from tisim.plotting.look import USUAL, Look
 from tisim.plotting.scenery import NO_SCENERY, Scenery, finite_grains, scenery, window
@@ -61,6 +62,10 @@ def start_and_end(
     each = zip(states, times, measures, strict=True)
     beside = [scenery(scene, states, time, known, state) for state, time, known in each]
     part = window(states, beside, look)
+    if look.lines is not None:
+        with FieldLines(scene, look.lines) as field:
+            pairs = zip(beside, states, times, strict=True)
+            beside = [field.beside(around, state, time) for around, state, time in pairs]
     headings = "start", last
     for axis, state, heading, time, around in zip(axes, states, headings, times, beside, strict=True):
         tints = None if colours is None else colours.of(state)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from subprocess import CalledProcessError
 
@@ -20,6 +20,7 @@ from tisim.io.reader import Frames
 from tisim.plotting import cloud
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.colours import Colouring, chosen, sample, scaled, values_of
+from tisim.plotting.field_lines import FieldLines
 from tisim.plotting.look import USUAL, Look
 from tisim.plotting.scenery import finite_grains, remaining, scenery, window
 from tisim.rendering.camera import Window
@@ -61,6 +62,7 @@ def movie(
     unfinished = path.with_name(while_drawn(path))
     try:
         with (
+            nullcontext() if look.lines is None else FieldLines(frames.scene, look.lines) as field,
             _writer(path, rate) as writer,
             replacing(path, unfinished),
             writer.saving(figure, str(unfinished), DPI),
@@ -68,6 +70,8 @@ def movie(
             for k, frame in enumerate(frames):
                 axis.clear()
                 around = scenery(frames.scene, [outermost], frame.time, frame.measures, frame.arrays)
+                if field is not None:
+                    around = field.beside(around, frame.arrays, frame.time)
                 colours = None if coloured is None else coloured.of(frame.arrays)
                 cloud.panel(axis, frame.arrays, part, around, colours, shapes, look, int(SIDE * DPI))
                 cloud.directions(axis, part, cloud.gravity(frames.scene), camera=look.camera)
