@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 HARD_FAMILIES = (
     "springs", "singular", "gyration", "moments", "ratios", "impacts", "reactions", "granular", "scales",
-    "single_precision", "packings", "default_stepper",
+    "single_precision", "packings", "filters", "default_stepper",
 )  # fmt: skip
 """The modules that define hard cases, in the order of ``tisim hard``."""
 
@@ -58,7 +58,8 @@ class Measured:
     @property
     def measured(self) -> str:
         """The number as text, or the reason for having none."""
-        return self.reason or f"{self.number:.3g}"
+        # Without the sign of a negative zero.
+        return self.reason or f"{self.number + 0.0:.3g}"
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,9 @@ fraction is below the packing fraction of the rods with their caps.
 
 The cube is periodic across the flow. Along the flow it is cut open, and may be repeated. Fibres are cut out
 by their centres, so that they protrude from both faces of the matrix by up to half their length.
+
+With ``tube``, rods are packed in a round tube in place of a cube, as in B16's separation cells of 20 and
+40 mm: 2 to 10 lengths of the fibres of 4 to 11 mm (section 7.3.2).
 """
 
 from dataclasses import dataclass
@@ -20,6 +23,7 @@ from tisim.cases.common.runs import sound
 from tisim.cases.packing.scene import packed_by
 from tisim.components.component import Vector
 from tisim.errors import must
+from tisim.geometry import CylindricalContainer
 from tisim.shapes import SpherocylinderShape
 from tisim.sources import Cylinder
 from tisim.steppers import EnergyMinimisation
@@ -39,9 +43,10 @@ class Matrix:
     """The fibres of a filter.
 
     diameter : D of a fibre, m. aspect : L/D. fraction : volume of the fibres over the volume of the matrix.
-    layers : cubes along the flow, which are copies of one packing. seed : of the packing. width : least side
-    of the cube over the length of a rod with its caps; 2 or more, so that a rod touches no two images of
-    another.
+    layers : cubes, or lengths of tube, along the flow, which are copies of one packing. seed : of the
+    packing. width : least side of the cube, or length of the tube, over the length of a rod with its caps; 2
+    or more, so that a rod touches no two images of another. tube : diameter of the tube over the same length;
+    None for a cube that is periodic across the flow.
     """
 
     diameter: float = 0.4e-3
@@ -50,6 +55,7 @@ class Matrix:
     layers: int = 1
     seed: int = 0
     width: float = 2.05
+    tube: float | None = None
 
     @property
     def length(self) -> float:
@@ -57,38 +63,54 @@ class Matrix:
         return self.aspect * self.diameter
 
     @property
-    def number(self) -> int:
-        """Return the number of fibres of a cube."""
-        side = self.width * (self.aspect + 1)
-        return int(np.ceil(self.fraction * side**3 / (np.pi / 4 * self.aspect)))
+    def across(self) -> float | None:
+        """Return the diameter of the tube, D; None for a cube."""
+        return None if self.tube is None else self.tube * (self.aspect + 1)
 
     @property
-    def side(self) -> float:
-        """Return the side of a cube, m."""
+    def number(self) -> int:
+        """Return the number of fibres of a cube or of a length of tube."""
+        side = self.width * (self.aspect + 1)
+        section = side**2 if self.across is None else np.pi / 4 * self.across**2
+        return int(np.ceil(self.fraction * section * side / (np.pi / 4 * self.aspect)))
+
+    @property
+    def sides(self) -> tuple[float, float, float]:
+        """Return the sides of the cube, or of the box around a length of tube, m."""
         volume = self.number * np.pi / 4 * self.diameter**2 * self.length / self.fraction
-        return float(np.cbrt(volume))
+        if self.across is None:
+            cube = float(np.cbrt(volume))
+            return cube, cube, cube
+        wide = self.across * self.diameter
+        return wide, wide, float(volume / (np.pi / 4 * wide**2))
+
+    @property
+    def section(self) -> float:
+        """Return the area across the flow, m^2."""
+        wide = self.sides[0]
+        return float(wide**2 * (1 if self.tube is None else np.pi / 4))
 
     @property
     def depth(self) -> float:
         """Return the length of the matrix along the flow, m."""
-        return self.layers * self.side
+        return self.layers * self.sides[2]
 
     @property
     def density(self) -> float:
         """Return the number of fibres in a volume, 1/m^3."""
-        return self.number / self.side**3
+        return self.number / (self.section * self.sides[2])
 
     def fibres(self) -> tuple[Cylinder, ...]:
-        """Return the fibres with centres in the box -side/2..side/2 by -side/2..side/2 by 0..depth (m), not
-        magnetised.
+        """Return the fibres, not magnetised. They are around the axis z, and their centres at 0..depth (m)
+        along it.
 
         InputError if rods of this aspect ratio jam before they have the fraction.
         """
-        centres, axes = _packing(self.aspect, self.fraction, self.number, self.seed)
-        centres = (centres - 0.5 * (1 - np.array(FLOW_DIRECTION))) * self.side
+        centres, axes = _packing(self.aspect, self.fraction, self.number, self.seed, self.across)
+        centres = (centres - 0.5 * (1 - np.array(FLOW_DIRECTION))) * self.sides
         return tuple(
             Cylinder(
-                centre=_vector(centre + layer * self.side * np.array(FLOW_DIRECTION)),
+                centre=_vector(centre + layer * self.sides[2] * np.array(FLOW_DIRECTION)),
                 axis=_vector(axis),
                 radius=self.diameter / 2,
                 length=self.length,
@@ -99,10 +121,12 @@ class Matrix:
 
     def with_images(self, fibres: tuple[Cylinder, ...], reach: float, bulk: bool) -> tuple[Cylinder, ...]:
         """Return the fibres, and after them their periodic images that come nearer than ``reach`` (m) to the
-        matrix: across the flow, and in the bulk also along it."""
-        size = np.array([self.side, self.side, self.depth])
+        matrix: across the flow of a cube, and in the bulk also along it."""
+        size = np.array([*self.sides[:2], self.depth])
         middle, images = np.array([0.0, 0.0, self.depth / 2]), []
         turns = [range(-k, k + 1) for k in np.ceil((reach + self.length) / size).astype(int)]
+        if self.tube is not None:
+            turns[:2] = range(1), range(1)
         if not bulk:
             turns[2] = range(1)
         for turn in product(*turns):
@@ -116,15 +140,18 @@ class Matrix:
 
 
 @lru_cache(KEPT_MATRICES)
-def _packing(aspect: float, fraction: float, number: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return centres in units of the side, each from 0 to 1, and unit vectors along the axes, shape (n, 3)
-    each."""
+def _packing(
+    aspect: float, fraction: float, number: int, seed: int, across: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return centres in units of the sides, each from 0 to 1, and unit vectors along the axes, shape (n, 3)
+    each. across : diameter of a tube, D; None for a cube."""
     rod = SpherocylinderShape(length=aspect, diameter=1.0)
     wanted = fraction * rod.volume() / (np.pi / 4 * aspect)
     must(0 < wanted < 1, "fraction of fibres", "one at which rods with their caps fill less than the space",
          fraction)  # fmt: skip
     stepper = EnergyMinimisation(target=wanted, fraction_step=0.02, tolerance=1e-3, patience=200)
-    made = packed_by(stepper, rod, number, min(LOOSE, wanted), seed=seed)
+    container = None if across is None else CylindricalContainer(diameter=across)
+    made = packed_by(stepper, rod, number, min(LOOSE, wanted), container, seed=seed)
     (result,) = sound(run([made.model_copy(update={"duration": LONGEST_PACKING})]))
     reached = result.measures["packing_fraction"]
     rule = (
@@ -132,7 +159,11 @@ def _packing(aspect: float, fraction: float, number: int, seed: int) -> tuple[np
     )
     must(reached > (1 - 1e-5) * wanted, "fraction of fibres", rule, fraction)
     packing = PackedBodies.from_result(result)
-    return (packing.position - packing.low) / (packing.high - packing.low), packing.axes()[:, 2]
+    sides = packing.high - packing.low
+    if across is not None:
+        # The tube grows with the rods, beyond the box of their start.
+        sides[:2] = across * packing.scale[0]
+    return 0.5 + (packing.position - (packing.low + packing.high) / 2) / sides, packing.axes()[:, 2]
 
 
 def _vector(v: np.ndarray) -> Vector:

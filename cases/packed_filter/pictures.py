@@ -99,7 +99,9 @@ def streamlines(scene: Scene, unit: float) -> np.ndarray:
     step = LINE_STEP * unit
     count = int((high[2] - low[2] + 4 * unit) / step * 1.3)
     with FieldSampler(scene.effects, FLOW) as flow:
-        return follow(lambda points: flow(points)[0], place, step, count)
+        # Nothing flows outside a tube.
+        some = place[flow(place)[0].any(axis=1)]
+        return follow(lambda points: flow(points)[0], some, step, count)
 
 
 def course(axis: Axes, states: list[Mapping[str, np.ndarray]], times: np.ndarray) -> None:

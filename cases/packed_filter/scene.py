@@ -7,7 +7,8 @@ that touches a fibre is captured.
 "static" is B16's static separation: the colloids are spread at random in the pores, and nothing flows. The
 matrix and the positions of the colloids are periodic along all axes. "dynamic" is B16's dynamic separation: a
 suspension enters in front of the matrix, flows through it, and is counted behind it. The matrix is periodic
-across the flow. The field is the sum of the fields of all fibres within ``IMAGE_REACH`` of the matrix.
+across the flow, or is in a tube, whose wall reflects colloids. The field is the sum of the fields of all
+fibres within ``IMAGE_REACH`` of the matrix.
 
 B16 gives the field of about 1 and 1.5 T, the fibres, of 0.4 mm and 4, 7 and 11 mm, and the magnetic radius of
 the colloids. It does not give the solid fraction, the flow, or the hydrodynamic radius, which is here the
@@ -30,8 +31,8 @@ from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.packed_filter.matrix import FLOW_DIRECTION, KEPT_MATRICES, Matrix
 from tisim.components.component import Vector
 from tisim.effects import Effect, LangevinMoment, Magnetophoresis
-from tisim.geometry import Plane
-from tisim.operators import Capture, Inlet, Outlet, Release
+from tisim.geometry import CylindricalSurface, Plane
+from tisim.operators import Capture, Inlet, Outlet, ReflectingWalls, Release
 from tisim.packing import GrainClass, LognormalSizes, MagneticCore
 from tisim.packing.grains import draw
 from tisim.packing.magnetic_core import core_normals
@@ -65,6 +66,8 @@ ADHERING = 0.4
 MATRIX_SETTINGS = tuple(one.name for one in fields(Matrix))
 CLEAR = 1.001
 """Colloids start outside the fibres, enlarged by this factor."""
+TUBE = 2.0
+"""Diameter of the tube of variant "tube" over the length of a rod with its caps."""
 Mode = Literal["static", "dynamic"]
 Flow = Literal["resolved", "uniform"]
 
@@ -158,13 +161,21 @@ class PackedFilter:
 
     def box(self) -> Box:
         """Return the box of the matrix."""
-        half, along = self.matrix.side / 2, self.mode == "static"
+        half, across = self.matrix.sides[0] / 2, self.matrix.tube is None
         return Box(
             low=(-half, -half, 0.0),
             high=(half, half, self.matrix.depth),
-            periodic=(True, True, along),
+            periodic=(across, across, self.mode == "static"),
             images=False,
         )
+
+    def walls(self) -> tuple[ReflectingWalls, ...]:
+        """Return the wall of a tube, on which colloids do not stick."""
+        if self.matrix.tube is None:
+            return ()
+        radius, depth = self.matrix.sides[0] / 2, self.matrix.depth
+        tube = CylindricalSurface(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, depth), radius=radius)
+        return (ReflectingWalls(cylinders=(tube,)),)
 
     def scene(self, seed: int) -> Scene:
         """Return the scene of a seed."""
@@ -181,7 +192,7 @@ class PackedFilter:
         return Scene(
             name="packed_filter",
             particles=Particles(
-                position=in_pores(self.number, magnets, box, seed),
+                position=in_pores(self.number, magnets, box, seed, self.matrix.tube is not None),
                 velocity=np.zeros((self.number, 3)),
                 radius=radius,
                 density=MAGNETITE_DENSITY,
@@ -199,6 +210,7 @@ class PackedFilter:
                 ),
                 LangevinMoment(temperature=WATER_TEMPERATURE),
                 Magnetophoresis(),
+                *self.walls(),
                 Capture(release=self.release()),
                 *self.stream(fibres, box),
             ),
@@ -217,10 +229,13 @@ class PackedFilter:
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
             x, y, z = self.cells or (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
+            # The speed of the tube is the mean over the square around it.
+            tube = self.matrix.tube is not None
             flow = PoreFlow(
                 low=(left, front, first),
                 high=(right, back, last),
-                speed=self.speed,
+                column="tube" if tube else "none",
+                speed=self.speed * self.matrix.section / self.matrix.sides[0] ** 2,
                 viscosity=WATER_VISCOSITY,
                 cylinders=fibres,
                 cells=(x, y, z),
@@ -260,15 +275,16 @@ class PackedFilter:
         )
 
 
-def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int) -> np.ndarray:
-    """Return random positions in a box outside the fibres, m, shape (number, 3)."""
+def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int, tube: bool = False) -> np.ndarray:
+    """Return random positions in a box, or in a tube along z in it, outside the fibres, m, shape
+    (number, 3)."""
     generator = np.random.default_rng([seed, 0x904E5])
     centre, axis = (np.array([getattr(one, name) for one in fibres]) for name in ("centre", "direction"))
     radius, half = np.array([(one.radius, one.length / 2) for one in fibres]).T * CLEAR
     found = np.empty((0, 3))
     while len(found) < number:
         tried = generator.uniform(box.low, box.high, (number, 3))
-        inside = np.zeros(number, bool)
+        inside = np.hypot(tried[:, 0], tried[:, 1]) * CLEAR > box.high[0] if tube else np.zeros(number, bool)
         for k in range(len(fibres)):
             away = tried - centre[k]
             along = away @ axis[k]
@@ -323,9 +339,15 @@ def uniform_scene(size: str, seed: int) -> Scene:
     return filter_of(size, seed=seed, flow="uniform").scene(seed)
 
 
+def tube_scene(size: str, seed: int) -> Scene:
+    """Return dynamic separation in a tube."""
+    return filter_of(size, seed=seed, tube=TUBE).scene(seed)
+
+
 PACKED_FILTER_SCENES: Mapping[str, Callable[[str, int], Scene]] = {
     "dynamic": scene_for,
     "static": static_scene,
     "uniform-flow": uniform_scene,
+    "tube": tube_scene,
 }
 """Scenes of ``tisim run packed_filter --variant``."""

@@ -25,6 +25,8 @@ from tisim.optimize.evaluation.runs import Evaluator
 from tisim.optimize.outcome import Outcome, Progress
 from tisim.optimize.problem.feasibility import ANSWERS, excess, feasible, penalised
 from tisim.optimize.problem.problem import Problem
+from tisim.optimize.report import front_comparison
+from tisim.optimize.report.front_comparison import FrontResult, front_result
 from tisim.optimize.search import search
 from tisim.optimize.search_folder import check_problem, resume_or_clear
 from tisim.optimize.settings import Settings, fit, identity, proposed
@@ -130,9 +132,8 @@ def plan(
     """Return the plan of a comparison; repeat k of every method has the same random starts.
 
     base : settings of a search, as of a case. evaluations : number of runs of each search. InputError for
-        several objectives, unknown methods and invalid numbers.
+        unknown methods and invalid numbers.
     """
-    must(not problem.several, "problem of a comparison", "one with one objective", problem.name)
     must(len(set(methods)) == len(methods) > 0, "methods", "one or more, all different", list(methods))
     must(evaluations >= 1, "evaluations", "at least 1", evaluations)
     must(1 <= repeats <= FRESH, "repeats", f"within 1..{FRESH}", repeats)
@@ -147,8 +148,8 @@ def plan(
 
 def compare(
     plan: Plan, evaluator: Evaluator, cache: Cache, on_progress: Callable[[Progress], None] | None = None
-) -> Iterator[MethodResult]:
-    """Yield the result of each search of a plan.
+) -> Iterator[MethodResult | FrontResult]:
+    """Yield the result of each search of a plan; of fronts for several objectives.
 
     Everything is cached, so a stopped comparison can be resumed. KeyboardInterrupt if a search was stopped.
     """
@@ -158,12 +159,15 @@ def compare(
         outcome = search(plan.problem, evaluator, cache, settings, on_progress=on_progress)
         if outcome.interrupted:
             raise KeyboardInterrupt
-        yield _result(method, repeat, outcome, fresh_ensemble)
+        if outcome.best is None:
+            raise RunError(f"{method}, repeat {repeat}: no design has run to its end")
+        result = front_result if plan.problem.several else method_result
+        yield result(method, repeat, outcome, fresh_ensemble)
 
 
-def _result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble) -> MethodResult:
-    if outcome.best is None:
-        raise RunError(f"{method}, repeat {repeat}: no design has run to its end")
+def method_result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble) -> MethodResult:
+    """Return the result of a search for one objective whose hall is not empty."""
+    assert outcome.best is not None
     design = outcome.problem.genome.decode(outcome.best)
     (estimates,) = fresh_ensemble.estimate([design])
     assert estimates is not None  # this ensemble has no budget
@@ -172,18 +176,33 @@ def _result(method: str, repeat: int, outcome: Outcome, fresh_ensemble: Ensemble
     return MethodResult(method, repeat, outcome.evaluations + outcome.hits, claimed, estimates[0], limits)
 
 
+def summary(problem: Problem, result: MethodResult | FrontResult) -> str:
+    """Return the number of runs of a search, and whether its designs satisfy the constraints."""
+    line = f"{result.evaluations} runs"
+    if isinstance(result, FrontResult):
+        line += f", {len(result.fresh)} designs of the front"
+        return f"{line}, {result.violated} of them infeasible" if problem.result_constraints else line
+    return f"{line}, feasible: {verdict(problem, result)}" if problem.result_constraints else line
+
+
 def verdict(problem: Problem, result: MethodResult) -> str:
     """Return whether the best design of a search satisfies the constraints of the result by its fresh starts,
     as in ``best.csv``: yes, unproven or no."""
     return ANSWERS[feasible(problem.result_constraints, result.limits)]
 
 
-def table(problem: Problem, results: Sequence[MethodResult]) -> Table:
-    """Return a table with a line for each method, the best median first.
+def table(problem: Problem, results: Sequence[MethodResult] | Sequence[FrontResult]) -> Table:
+    """Return a table with a line for each method, the best median first: of the best designs for one
+    objective, or of the hypervolumes of the fronts (``front_comparison``)."""
+    fronts = [one for one in results if isinstance(one, FrontResult)]
+    if fronts:
+        return front_comparison.table(problem, fronts)
+    return _table_of_best(problem, [one for one in results if isinstance(one, MethodResult)])
 
-    It shows the best designs from held-out starts, and the estimates of the searches themselves. With
-    constraints of the result, designs that violate one are behind all others.
-    """
+
+def _table_of_best(problem: Problem, results: Sequence[MethodResult]) -> Table:
+    """Return the table for one objective: the best designs from held-out starts, and the estimates of the
+    searches themselves. With constraints of the result, designs that violate one are behind all others."""
     (objective,) = problem.objectives
     constraints = problem.result_constraints
     meaning = problem.meanings.get(objective.name, "")
@@ -222,8 +241,15 @@ def _median(values: Sequence[float]) -> float:
     return float(np.median(values)) if values else math.nan
 
 
-def as_csv(problem: Problem, results: Sequence[MethodResult]) -> bytes:
-    """Return a CSV file with a line for each search and all digits."""
+def as_csv(problem: Problem, results: Sequence[MethodResult] | Sequence[FrontResult]) -> bytes:
+    """Return a CSV file with a line for each search, or for each design of each front, and all digits."""
+    fronts = [one for one in results if isinstance(one, FrontResult)]
+    if fronts:
+        return front_comparison.as_csv(problem, fronts)
+    return _csv_of_best(problem, [one for one in results if isinstance(one, MethodResult)])
+
+
+def _csv_of_best(problem: Problem, results: Sequence[MethodResult]) -> bytes:
     (objective,) = problem.objectives
     text = io.StringIO(newline="")
     writer = csv.writer(text)

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.special import j0, jn_zeros
 
 from tests.scenes import by_id, roundoff, scene, simulate
 from tests.steppers.brownian.colloids import DIFFUSIVITY, HEAT, RADIUS, SIGMAS, colloids, run
-from tisim import InputError
+from tisim import InputError, Particles, Scene
 from tisim.geometry import CylindricalSurface, Plane, SphericalSurface
-from tisim.operators import ReflectingWalls
+from tisim.operators import Inlet, ReflectingWalls
+from tisim.sources import UniformFlow
+from tisim.steppers import Brownian, DriftLimit
 
 TILT = np.array([0.48, -0.6, 0.64])
 HALF = 0.5
@@ -154,6 +157,26 @@ def test_a_sediment_keeps_its_barometric_distribution(diffused):
     assert y.mean() == pytest.approx(1.0, abs=SIGMAS / np.sqrt(MANY))
     assert np.exp(-y).mean() == pytest.approx(0.5, abs=SIGMAS * np.sqrt(1 / 12 / MANY))
     assert y.min() >= 0
+
+
+def test_particles_enter_and_diffuse_inside_a_tube_only():
+    """In a uniform flow through a square region around the tube; they enter evenly over its section."""
+    n, side = 2000, 2e-5
+    made = Scene(
+        particles=Particles(position=np.zeros((n, 3)), velocity=np.zeros((n, 3)), radius=RADIUS, density=1e3),
+        effects=(
+            UniformFlow(velocity=(0.0, 0.0, 1e-4)),
+            Inlet(low=(-side, -side, 0), high=(side, side, 1e-7), direction=(0, 0, 1), end=0.05),
+            ReflectingWalls(cylinders=[CylindricalSurface(end=(0, 0, 1.0), radius=side)]),
+        ),
+        stepper=Brownian(temperature=298.0, viscosity=1e-3, control=DriftLimit(longest=1e-3)),
+        duration=0.06,
+    )
+    (result,) = run([made])
+    assert result.work["entered"] == n
+    rho = np.hypot(*result.state["position"][:, :2].T) / (side - RADIUS)
+    assert rho.max() <= 1 + 1e-12
+    assert stats.kstest(rho**2, "uniform").pvalue > 1e-3
 
 
 def test_no_walls_and_particles_outside_are_refused():

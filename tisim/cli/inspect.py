@@ -163,6 +163,7 @@ def report(
             help="Checks that 'tisim check --out' has written.",
         ),
     ] = None,
+    lines: Lines = None,
     overwrite: Overwrite = False,
     plugins: Plugins = None,
 ) -> None:
@@ -185,7 +186,9 @@ def report(
             for name, figure in found.items()
         }
         _print_missing(trajectory.missing)
-    options = ReportOptions(limit, fields or None, contacts, drawn, read_checks(checks) if checks else ())
+    options = ReportOptions(
+        limit, fields or None, contacts, drawn, read_checks(checks) if checks else (), lines
+    )
     output_folder.claim(path.parent, (path.name,), overwrite)
     with err().status("writing"):
         print(run_report(file, path, world, options))

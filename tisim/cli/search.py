@@ -189,7 +189,8 @@ def compare(
     executor: Executor = "batch",
     plugins: Plugins = None,
 ) -> None:
-    """Compare search methods at equal numbers of runs.
+    """Compare search methods at equal numbers of runs: by their best designs, or by the hypervolumes of their
+    fronts for several objectives.
 
     The same command, given again, resumes where it was stopped; with other methods or numbers it reuses the
     runs.
@@ -223,9 +224,8 @@ def compare(
         try:
             for result in searches:
                 results.append(result)
-                line = f"{result.method}, search {result.repeat + 1} of {repeats}: {result.evaluations} runs"
-                if problem.result_constraints:
-                    line += f", feasible: {comparison.verdict(problem, result)}"
+                line = f"{result.method}, search {result.repeat + 1} of {repeats}: "
+                line += comparison.summary(problem, result)
                 err().print(line, highlight=False, markup=False)
         except KeyboardInterrupt:
             message = f"stopped; {out_folder / comparison.COMPARISON_FILE} has all finished runs."

@@ -26,6 +26,10 @@ CLEARANCE_FIELDS = (
 )
 """A distance within which there was no magnet when one was last looked for, and the place of the particle
 then. It can touch none before it has moved by the difference of this distance and its radius."""
+MOST_SURFACES = 8
+"""Largest number of surfaces onto which a particle is placed in turn, in a gap narrower than itself."""
+SQUEEZED = 1e-9
+"""Overlap or distance that is left in such a gap, in radii."""
 SURE = 0.999
 """Part of this path in which no magnet is looked for, whatever the rounding."""
 
@@ -39,7 +43,9 @@ class Capture(TouchingMagnets):
     the lists of the scene in order, or -1; ``captured_at`` is the end of the step in which the particle
     touched (s), or -1. ``work["captures"]`` is the number of captures. A particle whose step ends inside a
     magnet is moved to the nearest point outside, so the path in a step must be short compared with the size
-    of the magnet. Impacts are refused, because they would move a captured particle.
+    of the magnet. If it is then in another magnet, as in a gap narrower than itself, it is moved along the
+    surface of the first until it rests on both. Impacts are refused, because they would move a captured
+    particle.
 
     A captured particle stays for ever, as in B16 6.3, unless ``release`` is given. ``Release`` describes when
     a particle is then freed; ``captured_by`` and ``captured_at`` are -1 again, ``released_at`` is the time of
@@ -100,11 +106,22 @@ class Capture(TouchingMagnets):
         clear = ti.max(SURE * (s.clearance[w, i] - radius), 0.0)
         by, outward, free = -1, 0.0 * r, s.fixed[w, i] == 0
         if free and not ((r - s.cleared_from[w, i]).norm_sqr() < clear * clear):
-            touched, distance, away = self.touched(w, r, radius)
-            s.clearance[w, i], s.cleared_from[w, i] = distance, r
-            if touched >= 0:
-                by, outward = touched, away
-                s.position[w, i] = r + (radius - distance) * outward
+            place, tries, going = r, 0, True
+            # One call for all surfaces, as magnets may take long to compile.
+            while going and tries < MOST_SURFACES:
+                # A surface that the last displacement has left is found again.
+                touched, distance, away = self.touched(w, place, ti.select(tries == 0, 1.0, 1.5) * radius)
+                if tries == 0:
+                    s.clearance[w, i], s.cleared_from[w, i] = distance, r
+                overlap = radius - distance
+                going = touched >= 0 and (tries == 0 or ti.abs(overlap) > SQUEEZED * radius)
+                if going:
+                    out = self.along(outward, away) * overlap
+                    going = out.norm_sqr() <= 4.0 * radius * radius or tries == 0
+                    if going:
+                        by, outward, place = touched, away, place + out
+                tries += 1
+            s.position[w, i] = place
         if self.may_come_off(s, w, i, t):
             by = s.captured_by[w, i]
             outward = self.outward(w, by, r)
@@ -118,6 +135,14 @@ class Capture(TouchingMagnets):
                 s.velocity[w, i] -= inward * outward
             elif not holds:
                 self.let_go(s, w, i, t)
+
+    @ti.func
+    def along(self, resting, away):
+        """Return the displacement per overlap that takes a particle off a surface with the outward normal
+        ``away``, along the surface with the normal ``resting`` on which it is already; 0 for none."""
+        c = away.dot(resting)
+        across = ti.max(1.0 - c * c, 1e-12)
+        return (away - c * resting) / across
 
     @ti.func
     def may_come_off(self, s, w, i, t):

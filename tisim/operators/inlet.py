@@ -18,6 +18,7 @@ from tisim.numerics.random_streams import INLET
 from tisim.operators.base import option, parameter
 from tisim.operators.filled_region import FilledRegion
 from tisim.operators.outlet import Outlet
+from tisim.operators.reflecting_walls import ReflectingWalls
 from tisim.operators.touching_magnets import TouchingMagnets
 from tisim.sources.base import Source, sources
 from tisim.state.bound import Peers
@@ -43,9 +44,9 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
     independent: the feed is a Poisson process of as many particles as the start has. At the end of the step
     that contains its time, a particle is placed at random in the region, with a density proportional to the
     velocity u.n of the flow along ``direction``, as in a suspension of uniform concentration, and moves on
-    with the velocity of the flow. Places at which it would touch a magnet are rejected; where nothing flows,
-    nothing enters. If all ``tries`` trials fail, it is tried again in the next step. A short time from
-    ``begin`` to ``end`` is a pulse, a long one a step of the concentration.
+    with the velocity of the flow. Places at which it would touch a magnet or a reflecting wall are rejected;
+    where nothing flows, nothing enters. If all ``tries`` trials fail, it is tried again in the next step. A
+    short time from ``begin`` to ``end`` is a pulse, a long one a step of the concentration.
 
     Particles that diffuse back through the upstream face of the region are reflected there: the flux into the
     region equals the feed (P. V. Danckwerts, Chem. Eng. Sci. 2 (1953) 1).
@@ -139,7 +140,8 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
         return [*super().values(), upstream]
 
     def connect(self, peers: Peers) -> dict[str, Any]:
-        return {**super().connect(peers), "flows": sources(peers, FLOW)}
+        flows, walls = sources(peers, FLOW), peers.of(ReflectingWalls)
+        return {**super().connect(peers), "flows": flows, "walls": walls}
 
     @ti.func
     def particle(self, s, w, i, t, dt):
@@ -165,7 +167,11 @@ class Inlet(Directed, FilledRegion, TouchingMagnets):
                 velocity += flow.value(w, place, t)
             if ti.cast(u[3], s.real) * self.fastest(w) < velocity.dot(self.axis(w)):
                 by, _distance, _outward = self.touched(w, place, s.radius[w, i])
-                if by < 0:
+                free = by < 0
+                for walls in ti.static(self.walls):
+                    depth, _normal = walls.deepest(w, place, s.radius[w, i])
+                    free = free and depth <= 0.0
+                if free:
                     s.position[w, i], s.velocity[w, i] = place, velocity
                     s.fixed[w, i], s.entered_at[w, i] = 0, t
                     ti.atomic_add(s.entered[w], 1)

@@ -69,9 +69,9 @@ class DrawnBody:
     def facts(self) -> dict[str, object]:
         """Return it as plain data, with coordinates of COORDINATE_DIGITS digits."""
         return {
-            "name": self.name, "vertices": _digits(self.mesh.vertices),
+            "name": self.name, "vertices": digits(self.mesh.vertices),
             "triangles": self.mesh.triangles.ravel().tolist(), "lines": self.mesh.lines.ravel().tolist(),
-            "poses": _digits(self.poses), "stretches": _digits(self.stretches),
+            "poses": digits(self.poses), "stretches": digits(self.stretches),
         }  # fmt: skip
 
 
@@ -98,7 +98,7 @@ class DrawnMagnet:
         }  # fmt: skip
 
 
-def _digits(values: np.ndarray) -> list[float]:
+def digits(values: np.ndarray) -> list[float]:
     """Return numbers rounded to COORDINATE_DIGITS significant digits, in a row."""
     return [float(f"{value:.{COORDINATE_DIGITS}g}") for value in values.ravel().tolist()]
 

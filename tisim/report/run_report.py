@@ -54,6 +54,7 @@ class ReportOptions:
     contacts : whether to store the contacts of grains.
     pictures : further pictures as PNG, by title.
     checks : rows of text of a table of checks, from ``read_checks``.
+    lines : a field whose lines in the last frame are shown: "magnetic", "electric" or "flow"; None for none.
     """
 
     limit: float = SIZE_LIMIT
@@ -61,6 +62,7 @@ class ReportOptions:
     contacts: bool = True
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     checks: Sequence[Sequence[str]] = ()
+    lines: str | None = None
 
     def __post_init__(self) -> None:
         must(0.5 <= self.limit < np.inf, "limit", "at least 0.5 MB, and finite", self.limit)
@@ -128,7 +130,7 @@ def run_page(
         lengths, data = [*lengths, len(network.data())], data + network.data()
     facts = {
         "name": scene.name, "trajectory": trajectory.facts(), "lengths": lengths,
-        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
+        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory, options.lines),
         "series": {"times": tables.digits(times), "curves": panels},
         "maps": colour_maps(), "materials": list(scene.materials),
     }  # fmt: skip

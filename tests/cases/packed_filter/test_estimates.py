@@ -99,7 +99,7 @@ def test_designs_have_enough_fibres_and_one_grid():
     first, second = (problem.designed(one, 0, **problem.SEARCHED["small"]) for one in (low, high))
     assert first.matrix.number >= problem.FEWEST_FIBRES
     assert (first.cells, first.number) == (second.cells, second.number)
-    assert first.matrix.side >= 2 * (first.matrix.length + first.matrix.diameter)
+    assert first.matrix.sides[0] >= 2 * (first.matrix.length + first.matrix.diameter)
     faster = problem.designed({**high, "speed": 1e-3}, 0, **problem.SEARCHED["small"])
     assert faster.duration == pytest.approx(second.duration * problem.SPEED / 1e-3)
 

@@ -18,16 +18,16 @@ MATRIX = Matrix(aspect=2.0, fraction=0.2)
 def test_fibres_fill_their_fraction_without_overlaps():
     fibres = MATRIX.fibres()
     volume = sum(np.pi * one.radius**2 * one.length for one in fibres)
-    assert volume / MATRIX.side**3 == pytest.approx(0.2, rel=1e-9)
-    assert MATRIX.density == pytest.approx(len(fibres) / MATRIX.side**3)
+    assert volume / MATRIX.sides[0] ** 3 == pytest.approx(0.2, rel=1e-9)
+    assert MATRIX.density == pytest.approx(len(fibres) / MATRIX.sides[0] ** 3)
     centre = np.array([one.centre for one in fibres])
     axis = np.array([one.direction for one in fibres])
-    low = np.array([-MATRIX.side / 2, -MATRIX.side / 2, 0.0])
+    low = np.array([-MATRIX.sides[0] / 2, -MATRIX.sides[0] / 2, 0.0])
     assert (centre >= low).all()
-    assert (centre <= low + MATRIX.side).all()
+    assert (centre <= low + MATRIX.sides[0]).all()
     for k in range(len(fibres) - 1):
         apart = centre[k + 1 :] - centre[k]
-        apart -= MATRIX.side * np.rint(apart / MATRIX.side)
+        apart -= MATRIX.sides[0] * np.rint(apart / MATRIX.sides[0])
         half = MATRIX.length / 2
         distances = segment_distances(apart, axis[k], axis[k + 1 :], half, half)
         # Packings permit overlaps of the rods by a thousandth of D.
@@ -37,11 +37,35 @@ def test_fibres_fill_their_fraction_without_overlaps():
 
 
 @pytest.mark.slow
+def test_fibres_fill_their_fraction_of_a_tube_and_are_inside():
+    tube = Matrix(aspect=2.0, fraction=0.2, tube=1.5)
+    wide, _, long = tube.sides
+    assert wide == pytest.approx(1.5 * (tube.length + tube.diameter))
+    assert long >= 2 * (tube.length + tube.diameter)
+    fibres = tube.fibres()
+    volume = sum(np.pi * one.radius**2 * one.length for one in fibres)
+    assert volume / (np.pi / 4 * wide**2 * long) == pytest.approx(0.2, rel=1e-9)
+    assert tube.density == pytest.approx(len(fibres) / (np.pi / 4 * wide**2 * long))
+    for one in fibres:
+        ends = np.array(one.centre) + np.outer([-0.5, 0.5], np.array(one.direction) * one.length)
+        # By a thousandth of D, as overlaps.
+        assert np.hypot(*ends[:, :2].T).max() + one.radius < wide / 2 + 1e-3 * tube.diameter
+        assert 0 <= one.centre[2] <= long
+    # Some touch the wall.
+    assert max(np.hypot(*one.centre[:2]) for one in fibres) > 0.5 * (wide / 2 - tube.diameter)
+    assert tube.with_images(fibres, 2e-3, bulk=False) == fibres
+    along = {one.centre[2] // long for one in tube.with_images(fibres, 2e-3, bulk=True)}
+    assert {-1.0, 0.0, 1.0} <= along
+
+
+@pytest.mark.slow
 def test_layers_are_copies_along_the_flow():
     one, two = MATRIX.fibres(), Matrix(aspect=2.0, fraction=0.2, layers=2).fibres()
     assert two[: len(one)] == one
     for first, second in zip(one, two[len(one) :], strict=True):
-        np.testing.assert_allclose(np.subtract(second.centre, first.centre), [0, 0, MATRIX.side], atol=1e-15)
+        np.testing.assert_allclose(
+            np.subtract(second.centre, first.centre), [0, 0, MATRIX.sides[0]], atol=1e-15
+        )
 
 
 @pytest.mark.slow
@@ -57,9 +81,9 @@ def test_all_images_near_the_matrix_are_there(bulk):
     middle = np.array([0.0, 0.0, MATRIX.depth / 2])
     missing = 0
     for turn, body in product(turns, fibres):
-        centre = np.array(body.centre) + np.array(turn) * MATRIX.side
+        centre = np.array(body.centre) + np.array(turn) * MATRIX.sides[0]
         ends = centre + np.outer([-0.5, 0.0, 0.5], np.array(body.direction) * body.length)
-        near = (np.abs(ends - middle) < MATRIX.side / 2 + reach).all(axis=1).any()
+        near = (np.abs(ends - middle) < MATRIX.sides[0] / 2 + reach).all(axis=1).any()
         missing += near and tuple(np.round(centre / 1e-9).astype(int)) not in known
     assert missing == 0
 

@@ -109,3 +109,30 @@ def test_the_small_scene_is_dynamic_and_the_static_one_is_periodic():
         for s in (dynamic, static)
     ]
     assert count[0] < count[1]
+
+
+@pytest.mark.slow
+def test_colloids_stay_in_a_tube_with_its_flow():
+    """In the resolved flow, which rests at the wall, and in water at rest."""
+    coarse = {"number": 60, "tube": 1.5, "resolution": 3.0, "digits": None}
+    flowing = filter_of("small", feed=10.0, field_end=80.0, duration=160.0, **coarse)
+    scene, radius = flowing.scene(3), flowing.matrix.sides[0] / 2
+    (flow,) = (one for one in scene.effects if isinstance(one, PoreFlow))
+    rho, turn = (np.arange(40) + 0.5) / 40 * radius, np.arange(20) * np.pi / 10
+    plane = np.stack(
+        [
+            np.outer(rho, np.cos(turn)).ravel(),
+            np.outer(rho, np.sin(turn)).ravel(),
+            np.full(800, flow.low[2] + 1e-4),
+        ],
+        axis=1,
+    )
+    velocity, _ = sample(scene.effects, "flow_velocity", plane)
+    mean = (velocity[:, 2].reshape(40, 20).mean(axis=1) * rho).sum() / rho.sum()
+    assert mean == pytest.approx(flowing.speed, rel=0.02)
+    for one in (flowing, filter_of("small", "static", duration=20.0, **coarse)):
+        result = run(one.scene(3))
+        assert result.status.ok
+        assert missing([result]) == 0
+        assert result.work["captures"] > 5
+        assert np.hypot(*result.state["position"][:, :2].T).max() < radius

@@ -10,7 +10,6 @@ from rich.console import Console
 
 from tests.optimize.drift_case import CASE
 from tests.optimize.fake_runs import FakeCache, FakeEvaluator, bowl, fake_problem
-from tests.optimize.test_several import OBJECTIVES
 from tisim import InputError
 from tisim.cases import case as catalogue
 from tisim.cli.main import main
@@ -117,7 +116,6 @@ def test_incomparable_objects_are_refused():
         ({"fresh": 1}, "fresh starts must be at least 2; received 1"),
         ({"evaluations": 0}, "evaluations must be at least 1"),
         ({"methods": ["zohdi", "simplex"]}, "method must be one of .*; received 'simplex'"),
-        ({"problem": fake_problem(objective=OBJECTIVES)}, "one with one objective"),
     ):
         usual = {"methods": ["random"], "evaluations": 9, "repeats": 1, "fresh": 4, "problem": fake_problem()}
         with pytest.raises(InputError, match=message):

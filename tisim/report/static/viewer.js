@@ -326,7 +326,7 @@ class Viewer {
     this.chosen = -1;
     this.options = {
       colour: null, range: [0, 1], map: null, size: null, scale: 1, flat: false, walls: true, magnets: "solid",
-      box: true, contacts: false, outlines: true, cut: null, dark: false,
+      box: true, lines: true, contacts: false, outlines: true, cut: null, dark: false,
     };
     const { low, high } = scene.focus;
     this.centre = low.map((x, k) => (x + high[k]) / 2);
@@ -389,6 +389,7 @@ class Viewer {
     this.bodies = this.scene.bodies.map((body) => this.buildBody(body));
     this.boxLines = this.lines(this.boxEdges(0));
     this.contactLines = this.lines([]);
+    this.fieldLines = this.lines((this.scene.lines?.ends ?? []).map((x, k) => (x - this.centre[k % 3]) / this.unit));
     this.image = null;
     if (this.options.map) this.setMap(this.options.map, this.options.discrete);
   }
@@ -773,6 +774,7 @@ class Viewer {
     gl.uniform2f(places.screen, this.canvas.width * samples, this.canvas.height * samples);
     if (options.box) draw(this.boxLines, null, [ink, ink, ink, 1], [0.9, 0]);
     if (options.walls) for (const body of this.bodies) draw(body.lines, body, [ink, ink * 1.02, ink * 1.06, 1], [1.1, 0]);
+    if (options.lines && this.scene.lines) draw(this.fieldLines, null, [...this.scene.lines.colour.map((x) => x / 255 + (options.dark ? 0.2 : 0)), 1], [1.4, 0]);
     if (options.contacts && this.network) draw(this.contactLines, null, options.dark ? [0.98, 0.72, 0.3, 1] : [0.72, 0.2, 0.1, 1], [0.4, 6]);
   }
 
