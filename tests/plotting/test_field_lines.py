@@ -69,7 +69,7 @@ def test_the_field_of_moments_is_that_of_magnetised_spheres(rng):
 def test_sums_of_few_dipoles_at_a_time_are_the_same(pairs, rng, monkeypatch):
     place, moment, points = (rng.normal(size=(n, 3)) for n in (6, 6, 3))
     whole = dipole_field(points, place, moment, np.full(6, 0.1))
-    monkeypatch.setattr("tisim.plotting.field_lines.PAIRS_AT_ONCE", pairs)
+    monkeypatch.setattr("tisim.plotting.field_lines.SUMMED_PAIRS", pairs)
     np.testing.assert_allclose(dipole_field(points, place, moment, np.full(6, 0.1)), whole, rtol=1e-12)
 
 

@@ -17,7 +17,7 @@ from tisim.io.reader import frames
 from tisim.report.compressed_trajectory import compress
 from tisim.report.run_report import ReportOptions, run_report
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
-from tisim.sources import Cylinder, MagneticCylinders, MagneticSpheres, Sphere
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField, MagneticSpheres, Sphere
 from tisim.steppers import MechanicalContraction
 
 pytestmark = pytest.mark.long
@@ -292,6 +292,24 @@ def test_a_container_is_where_its_bodies_are(record, opened, tmp_path):
         apart = np.linalg.norm(points[:, None] - expected, axis=2)
         assert apart.min(axis=1).max() < 1e-7
         assert apart.min(axis=0).max() < 1e-7
+
+
+def test_field_lines_are_drawn_where_they_are_and_can_be_hidden(record, opened, tmp_path):
+    magnetised = scene(2, effects=(MagneticField(constant=(0.0, 0.0, 0.5)),))
+    places = [[-0.005, 0, 0], [0.005, 0, 0]]
+    path = record(magnetised, [{"id": [0, 1], "position": places}] * 3)
+    html = run_report(path, tmp_path / "r.html", options=ReportOptions(lines="magnetic"))
+    with opened(html) as page:
+        ends = np.reshape(page.evaluate("report.player.scene.lines.ends"), (-1, 2, 3))
+        assert len({(round(1e6 * x), round(1e6 * y)) for x, y in ends[:, 0, :2].tolist()}) == 49
+        assert np.abs(ends).max() <= 0.01
+        shown = "(report.player.viewer.draw(1), " + PIXELS + ")"
+        pictures = [page.evaluate(shown)]
+        box = page.get_by_label("magnetic lines at 20 ms")
+        for checked in (False, True):
+            box.set_checked(checked)
+            pictures.append(page.evaluate(shown))
+    assert pictures[0] == pictures[2] != pictures[1]
 
 
 def test_superquadrics_cover_their_area(record, opened, tmp_path):

@@ -22,18 +22,18 @@ QUANTITIES = {
     "magnetic": "magnetic_flux_density", "electric": "electric_field", "flow": "flow_velocity",
 }  # fmt: skip
 """Standard names of the quantities whose lines can be drawn, by the names that users give."""
-COLOURS = {"magnetic": (0.23, 0.37, 0.68), "electric": (0.78, 0.42, 0.12), "flow": (0.25, 0.58, 0.80)}
+LINE_COLOURS = {"magnetic": (0.23, 0.37, 0.68), "electric": (0.78, 0.42, 0.12), "flow": (0.25, 0.58, 0.80)}
 """Red, green and blue of lines, 0..1."""
-WIDTH = 3.0
+LINE_WIDTH = 3.0
 """Width of a line, rays."""
-LINES_ALONG_SIDE = 7
+SEEDS_ALONG_SIDE = 7
 """Lines along each side of the section in which lines begin."""
-STEPS = 160
+LINE_STEPS = 160
 """Number of steps along the diagonal of the box; a line has at most these many in either direction."""
-MARGIN = 0.15
+ROOM_FOR_LINES = 0.15
 """The box of lines in open space is larger than the one around particles and magnets by this, relative to its
 diagonal, on each side."""
-PAIRS_AT_ONCE = 2_000_000
+SUMMED_PAIRS = 2_000_000
 """Pairs of a point and a dipole that are summed at a time."""
 
 Field = Callable[[np.ndarray], np.ndarray]
@@ -71,7 +71,7 @@ def lines_through(field: Field, low: np.ndarray, high: np.ndarray) -> list[np.nd
     to z if that is 0, and end at the faces of the box.
     """
     middle, side = (low + high) / 2, high - low
-    part = (np.arange(LINES_ALONG_SIDE) + 0.5) / LINES_ALONG_SIDE - 0.5
+    part = (np.arange(SEEDS_ALONG_SIDE) + 0.5) / SEEDS_ALONG_SIDE - 0.5
     everywhere = middle + side * np.stack(np.meshgrid(part, part, part), axis=-1).reshape(-1, 3)
     mean = field(everywhere).mean(axis=0)
     normal = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0 else np.array([0.0, 0.0, 1.0])
@@ -84,8 +84,8 @@ def lines_through(field: Field, low: np.ndarray, high: np.ndarray) -> list[np.nd
     a, b = np.meshgrid(part * extent[0], part * extent[1])
     seeds = middle + a.reshape(-1, 1) * first + b.reshape(-1, 1) * second
     seeds = seeds[((seeds >= low) & (seeds <= high)).all(axis=1)]
-    step = float(np.linalg.norm(side)) / STEPS
-    ways = [follow(field, seeds, sign * step, STEPS) for sign in (-1.0, 1.0)]
+    step = float(np.linalg.norm(side)) / LINE_STEPS
+    ways = [follow(field, seeds, sign * step, LINE_STEPS) for sign in (-1.0, 1.0)]
     found = []
     for k in range(len(seeds)):
         backward, forward = (_inside(way[:, k], low, high) for way in ways)
@@ -110,7 +110,7 @@ def dipole_field(
     position, moment, radius : m, A m^2 and m, shape (k, 3), (k, 3) and (k,).
     """
     total = np.zeros((len(points), 3))
-    count = max(1, PAIRS_AT_ONCE // max(len(points), 1))
+    count = max(1, SUMMED_PAIRS // max(len(points), 1))
     for begin in range(0, len(position), count):
         some = slice(begin, begin + count)
         apart = points[:, None] - position[None, some]
@@ -172,7 +172,7 @@ class FieldLines:
             place, radius = finite_grains(state)
             every = np.concatenate([around, place - radius[:, None], place + radius[:, None]])
             low, high = every.min(axis=0), every.max(axis=0)
-            room = MARGIN * float(np.linalg.norm(high - low))
+            room = ROOM_FOR_LINES * float(np.linalg.norm(high - low))
             low, high = low - room, high + room
         return lines_through(self.field(state, time), low, high)
 
@@ -180,8 +180,8 @@ class FieldLines:
         """Return the surroundings of particles with the lines among them."""
         corners = [one.centre + sign * one.sizes()[:, None] for one in around.solids for sign in (-1, 1)]
         found = self.lines(state, time, np.concatenate([around.points, *corners]))
-        colour = np.array(COLOURS[self.name])
-        return replace(around, edges=(*around.edges, DrawnLines.of(ends(found), colour, WIDTH)))
+        colour = np.array(LINE_COLOURS[self.name])
+        return replace(around, edges=(*around.edges, DrawnLines.of(ends(found), colour, LINE_WIDTH)))
 
 
 def ends(lines: list[np.ndarray]) -> np.ndarray:

@@ -130,7 +130,8 @@ def run_page(
         lengths, data = [*lengths, len(network.data())], data + network.data()
     facts = {
         "name": scene.name, "trajectory": trajectory.facts(), "lengths": lengths,
-        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory, options.lines),
+        "network": network.facts() if network else None,
+        "scene": scenery(sequence, trajectory, options.lines),
         "series": {"times": tables.digits(times), "curves": panels},
         "maps": colour_maps(), "materials": list(scene.materials),
     }  # fmt: skip

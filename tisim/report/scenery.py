@@ -8,7 +8,7 @@ from matplotlib import colormaps
 from tisim.effects.walls.confinement import confinement
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.cloud import gravity
-from tisim.plotting.field_lines import COLOURS, FieldLines, ends
+from tisim.plotting.field_lines import LINE_COLOURS, FieldLines, ends
 from tisim.report import bodies
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence
 from tisim.shapes.particle_shape import ParticleShape
@@ -80,7 +80,7 @@ def _field_lines(
     time = float(sequence.times[last])
     with FieldLines(sequence.scene, name) as field:
         found = field.lines(sequence[last].arrays, time, around)
-    colour = [round(255 * part) for part in COLOURS[name]]
+    colour = [round(255 * part) for part in LINE_COLOURS[name]]
     return {"name": name, "time": time, "colour": colour, "ends": bodies.digits(ends(found))}
 
 
