@@ -104,7 +104,7 @@ def figure_html(one: recordings.Recorded, uri: str, alt: str, sections: dict[str
     facts = recordings.facts_of(one.script.read_text(encoding="utf-8"))
     caption = (
         f"<p>Recording of {_code(one.command)}: {escape(recordings.contents(facts))}; "
-        f"{facts['seconds']:.0f} s of CPU time. {escape(one.note)}</p>"
+        f"{facts['seconds']:.0f} s of CPU time with compilation. {escape(one.note)}</p>"
     )
     if page != GALLERY:
         section = sections[one.name]

@@ -12,6 +12,7 @@ import pytest
 from tests.report.conftest import record, scene
 from tisim.cases.case import every
 from tisim.io.reader import frames
+from tisim.report.bodies import DrawnBody, Mesh
 from tisim.report.kept_frames import KeptFrames
 
 __all__ = ["record"]
@@ -62,6 +63,10 @@ def test_a_recording_is_small_and_holds_its_particles(name):
     assert (np.ptp(place, axis=0).max() > 0) or name == "packing"
     radius = np.broadcast_to(values["radius"][..., 0], present.shape)
     assert (radius[present] > 0).all()
+    # As the viewer of today reads them.
+    drawn = DrawnBody("wall", Mesh.of(np.zeros((1, 3, 3)), np.zeros((0, 2, 3)))).facts()
+    assert all(body.keys() == drawn.keys() for body in facts["scene"]["bodies"])
+    assert {"box", "focus", "magnets", "shapes", "gravity", "lines"} < facts["scene"].keys()
     if colour:
         shown = next(column["shown"] for column in trajectory["columns"] if column["name"] == colour)
         tints = np.broadcast_to(values[colour][..., 0], present.shape)
