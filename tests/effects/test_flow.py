@@ -7,7 +7,7 @@ from tests.effects.contact.loads import WORLDS, close, cloud, loads, vector
 from tests.scenes import scene, simulate
 from tisim import InputError
 from tisim.effects import StokesDrag
-from tisim.sources import DarcyFlow, UniformFlow, kozeny_carman
+from tisim.sources import DarcyFlow, FieldSampler, UniformFlow, kozeny_carman
 from tisim.steppers import ErrorControl, Trapezoid
 
 FORMS = [("fibres", "packing", 4.0), pytest.param("spheres", "pores", 6.0, marks=pytest.mark.long)]
@@ -36,6 +36,27 @@ def test_drag_in_both_flows_together(packed, mean, per_size, rng):
         fluid = np.array(flow.velocity) - speed * np.array(darcy.pressure_gradient)
         expected = 6 * np.pi * 0.7 * state["radius"][:, None] * (fluid - state["velocity"])
         np.testing.assert_allclose(state["force"], expected, rtol=1e-12, atol=1e-12)
+
+
+def test_flows_begin_and_end():
+    """They act at their beginning, no more at their end, and a flow that never ends acts always."""
+    whole = UniformFlow(velocity=(1, 2, 3))
+    darcy = DarcyFlow(pressure_gradient=(-5.0, 0, 0), viscosity=1.0, porosity=0.5, diameter=1.0)
+    times = {"begin": 2.0, "end": 3.0}
+    both = [one.model_copy(update=times) for one in (whole, darcy)]
+    place = np.zeros((1, 3))
+    with FieldSampler(both, "flow_velocity") as field:
+        for time, acts in ((0.0, 0), (1.999, 0), (2.0, 1), (2.999, 1), (3.0, 0)):
+            found, slope = field(place, time)
+            if acts:
+                np.testing.assert_allclose(found[:, 1:], [[2, 3]])
+                assert found[0, 0] > 1
+            assert found.any() == bool(acts)
+            assert not slope.any()
+    assert not whole.kinked
+    assert all(one.kinked for one in both)
+    with pytest.raises(InputError, match=r"uniform_flow\.end must be after uniform_flow\.begin, 2 s"):
+        UniformFlow(velocity=(1, 2, 3), begin=2.0, end=1.0)
 
 
 def test_permeability_of_blake_kozeny_and_carman():

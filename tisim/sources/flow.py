@@ -7,11 +7,13 @@ from typing import Literal
 
 from tisim.backend.taichi import ti
 from tisim.components.component import Vector
-from tisim.sources.base import Source, option, parameter
+from tisim.sources.base import option, parameter
+from tisim.sources.switched import NO_END, Switched
 
 
-class UniformFlow(Source):
-    """A fluid moves everywhere at the same velocity; drag laws use it.
+class UniformFlow(Switched):
+    """A fluid moves everywhere at the same velocity; drag laws use it. It rests before ``begin`` and from
+    ``end`` on.
 
     Source: B16 section 7.2.
     """
@@ -19,13 +21,15 @@ class UniformFlow(Source):
     quantity = "flow_velocity"
 
     velocity: Vector = parameter("m/s", "velocity of the fluid", examples=[(1e-3, 0.0, 0.0)])
+    begin: float = parameter("s", "time from which on the fluid flows", 0.0, ge=0)
+    end: float = parameter("s", "time at which the flow ends", NO_END, gt=0)
 
     def strongest(self) -> float:
         return math.hypot(*self.velocity)
 
     @ti.func
     def value(self, w, r, t):
-        return self.velocity(w)
+        return ti.select(self.acts(w, t), 1.0, 0.0) * self.velocity(w)
 
 
 def kozeny_carman(porosity, size, constant):
@@ -41,7 +45,7 @@ def kozeny_carman(porosity, size, constant):
 _kozeny_carman = ti.func(kozeny_carman)
 
 
-class DarcyFlow(Source):
+class DarcyFlow(Switched):
     """A pressure gradient drives a fluid slowly through a packing; the velocity is the mean over the packing.
 
         U = -k/eta grad p,    k = (1 - phi)^3 nu^2 / (C phi^2)
@@ -49,7 +53,7 @@ class DarcyFlow(Source):
     k is the Kozeny-Carman permeability. nu is the volume over the surface of the packed bodies: D/4 for long
     fibres and D/6 for spheres of diameter D. The mean is over the whole packing (Darcy's velocity) or over
     the pores alone, in which the fluid is faster by one over the porosity. B16 (7.3) gives the mass flow
-    rate, rho_0 A U.
+    rate, rho_0 A U. The fluid rests before ``begin`` and from ``end`` on.
 
     Source: B16 Eqs (7.3), (7.4).
     """
@@ -67,6 +71,8 @@ class DarcyFlow(Source):
     constant: float = parameter("", "constant C of Kozeny and Carman; about 5 in random packings", 5.0, gt=0)
     packed: Literal["fibres", "spheres"] = option("shape of the packed bodies", "fibres")
     mean: Literal["packing", "pores"] = option("volume over which the velocity is averaged", "packing")
+    begin: float = parameter("s", "time from which on the fluid flows", 0.0, ge=0)
+    end: float = parameter("s", "time at which the flow ends", NO_END, gt=0)
 
     def strongest(self) -> float:
         size = self.diameter / (4 if self.packed == "fibres" else 6)
@@ -79,4 +85,4 @@ class DarcyFlow(Source):
         velocity = -_kozeny_carman(self.porosity(w), size, self.constant(w)) / self.viscosity(w)
         if ti.static(self.mean == "pores"):
             velocity /= self.porosity(w)
-        return velocity * self.pressure_gradient(w)
+        return ti.select(self.acts(w, t), velocity, 0.0) * self.pressure_gradient(w)

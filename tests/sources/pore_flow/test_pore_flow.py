@@ -10,7 +10,16 @@ from tisim import Box, InputError, Scene
 from tisim.backend import runtime
 from tisim.components import serialization
 from tisim.effects import StokesDrag
-from tisim.sources import Cylinder, PoreFlow, SolidCylinder, SolidSphere, Sphere, sample, stokes_flow
+from tisim.sources import (
+    Cylinder,
+    FieldSampler,
+    PoreFlow,
+    SolidCylinder,
+    SolidSphere,
+    Sphere,
+    sample,
+    stokes_flow,
+)
 from tisim.sources.pore_flow import pore_flow
 
 MM = 1e-3
@@ -124,6 +133,16 @@ def test_the_mean_over_the_box_is_the_superficial_velocity():
     mean = solved().mean_velocity
     # Splines keep it; the layer at surfaces, 1.3 cells of a fibre 5.6 cells thick, takes a little away.
     np.testing.assert_allclose(velocity.mean(axis=0), mean / mean[2] * 2e-3, atol=0.03 * 2e-3)
+
+
+def test_the_flow_begins_and_ends(rng):
+    places, switched = rng.uniform(LOW, HIGH, (20, 3)), flow(begin=2.0, end=3.0)
+    with FieldSampler([switched], switched.quantity) as field:
+        always = field(places, 2.5)
+        assert all(np.abs(one).max() > 0 for one in always)
+        for time, acts in ((0.0, 0), (1.999, 0), (2.0, 1), (3.0, 0)):
+            for found, expected in zip(field(places, time), always, strict=True):
+                np.testing.assert_array_equal(found, acts * expected)
 
 
 def test_a_pressure_gradient_drives_by_darcys_law():

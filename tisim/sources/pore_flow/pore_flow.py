@@ -13,11 +13,12 @@ from tisim.components.component import Vector
 from tisim.components.ranges import check_direction
 from tisim.effects.base import SceneParts
 from tisim.errors import Words, must
-from tisim.sources.base import Source, option, parameter
+from tisim.sources.base import option, parameter
 from tisim.sources.magnetic.cylinder import Cylinder
 from tisim.sources.magnetic.sphere import Sphere
 from tisim.sources.pore_flow.solids import Column, Grid, SolidBody, SolidCylinder, SolidSphere
 from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stokes_flow
+from tisim.sources.switched import NO_END, Switched
 
 AXIS_NAMES = ("x", "y", "z")
 KEPT_BYTES = 500_000_000
@@ -43,7 +44,7 @@ class UnitFlow(NamedTuple):
 _solved: OrderedDict[tuple[Any, ...], UnitFlow] = OrderedDict()
 
 
-class PoreFlow(Source):
+class PoreFlow(Switched):
     """A pressure gradient drives a viscous fluid slowly between fibres and spheres at rest; drag laws use its
     velocity.
 
@@ -70,6 +71,9 @@ class PoreFlow(Source):
 
     With ``column``, the faces of the box around ``axis`` are walls: of a duct, or of a round tube that
     touches them. The velocity is 0 in walls and beyond.
+
+    The fluid rests before ``begin`` and from ``end`` on; it starts and stops within the time R^2 rho/eta of a
+    pore, which is neglected.
 
     Source: B16 section 7.2.2 (Darcy's law).
     """
@@ -110,6 +114,8 @@ class PoreFlow(Source):
     tolerance: float = parameter(
         "", "velocity at walls over the mean velocity", WALL_TOLERANCE, ge=TOLERANCES[0], le=TOLERANCES[1]
     )
+    begin: float = parameter("s", "time from which on the fluid flows", 0.0, ge=0)
+    end: float = parameter("s", "time at which the flow ends", NO_END, gt=0)
 
     if TYPE_CHECKING:
         grid: ClassVar[Any]
@@ -234,15 +240,17 @@ class PoreFlow(Source):
 
     @ti.func
     def value(self, w, r, t):
-        return self.interpolate(w, r)[0]
+        return self.value_and_gradient(w, r, t)[0]
 
     @ti.func
     def gradient(self, w, r, t):
-        return self.interpolate(w, r)[1]
+        return self.value_and_gradient(w, r, t)[1]
 
     @ti.func
     def value_and_gradient(self, w, r, t):
-        return self.interpolate(w, r)
+        v, slope = self.interpolate(w, r)
+        flows = ti.select(self.acts(w, t), 1.0, 0.0)
+        return flows * v, flows * slope
 
     @ti.func
     def interpolate(self, w, r):
