@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Self
@@ -14,6 +14,7 @@ from tisim.effects.magnetic.moment import MOMENT
 from tisim.errors import must
 from tisim.plotting.scenery import Scenery, finite_grains
 from tisim.rendering.surfaces import DrawnLines
+from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.sources.base import Source
 from tisim.sources.sampling import FieldSampler
@@ -95,7 +96,7 @@ def lines_through(field: Field, low: np.ndarray, high: np.ndarray) -> list[np.nd
 
 def _inside(line: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return the points of a line before it leaves a box or ends."""
-    out = ~((line >= low) & (line <= high)).all(axis=1)
+    out = np.logical_not(((line >= low) & (line <= high)).all(axis=1))
     out[1:] |= (line[1:] == line[:-1]).all(axis=1)
     return line[: np.argmax(out)] if out.any() else line
 
@@ -141,8 +142,11 @@ class FieldLines:
             name in known, "lines", f"one of {', '.join(known)}" if known else "left out in this scene", name
         )
         self.scene, self.name, self.held = scene, name, ExitStack()
-        sampled = quantity in sources and quantity is not None
-        self.sampler = self.held.enter_context(FieldSampler(scene.effects, quantity)) if sampled else None
+        self.sampler = (
+            self.held.enter_context(FieldSampler(scene.effects, QUANTITIES[name]))
+            if quantity in sources
+            else None
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -150,7 +154,7 @@ class FieldLines:
     def __exit__(self, *failure: object) -> None:
         self.held.close()
 
-    def field(self, state: Mapping[str, np.ndarray], time: float) -> Field:
+    def field(self, state: Arrays, time: float) -> Field:
         """Return the field at a state and a time (s)."""
 
         def value(points: np.ndarray) -> np.ndarray:
@@ -161,7 +165,7 @@ class FieldLines:
 
         return value
 
-    def lines(self, state: Mapping[str, np.ndarray], time: float, around: np.ndarray) -> list[np.ndarray]:
+    def lines(self, state: Arrays, time: float, around: np.ndarray) -> list[np.ndarray]:
         """Return the lines at a state and a time (s); see ``lines_through``.
 
         They are in the box of the domain, and in open space in a box around the particles and other points
@@ -176,7 +180,7 @@ class FieldLines:
             low, high = low - room, high + room
         return lines_through(self.field(state, time), low, high)
 
-    def beside(self, around: Scenery, state: Mapping[str, np.ndarray], time: float) -> Scenery:
+    def beside(self, around: Scenery, state: Arrays, time: float) -> Scenery:
         """Return the surroundings of particles with the lines among them."""
         corners = [one.centre + sign * one.sizes()[:, None] for one in around.solids for sign in (-1, 1)]
         found = self.lines(state, time, np.concatenate([around.points, *corners]))
