@@ -6,14 +6,17 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.constants import mu_0
 
-from tests.report.conftest import scene
+from tests.report.conftest import record, scene
 from tisim import Box, InputError, Open
+from tisim.io.reader import frames
 from tisim.plotting.cloud import start_and_end
 from tisim.plotting.field_lines import FieldLines, dipole_field, ends, follow, lines_through
 from tisim.plotting.look import Look
+from tisim.plotting.movie import movie
 from tisim.plotting.scenery import NO_SCENERY
 from tisim.sources import MagneticField, UniformFlow
 
+__all__ = ["record"]
 LOW, HIGH = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 2.0])
 
 
@@ -133,3 +136,14 @@ def test_a_picture_has_lines_if_they_are_wanted(magnetised):
         pictures.append(figure.axes[0].images[0].get_array())
     blue = [(one[..., 2] > one[..., 0] + 0.15)[one[..., 3] > 0.5].sum() for one in pictures]
     assert blue[1] > blue[0] + 1000
+
+
+@pytest.mark.long
+def test_a_movie_has_lines_if_they_are_wanted(magnetised, record, tmp_path):
+    places = [[-0.5, 0, 0], [0.5, 0, 0]]
+    path, made = record(magnetised, [{"id": [0, 1], "position": places}] * 2), {}
+    for lines in (None, "magnetic"):
+        with frames(path) as sequence:
+            movie(sequence, tmp_path / "a.gif", look=Look(lines=lines))
+        made[lines] = (tmp_path / "a.gif").read_bytes()
+    assert len(made["magnetic"]) > 1.5 * len(made[None])

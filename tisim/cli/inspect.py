@@ -173,6 +173,7 @@ def report(
     pictures of the case.
     """
     from tisim.io.reader import frames
+    from tisim.plotting.field_lines import check_lines
     from tisim.plotting.time_series import mark_missing
     from tisim.report.run_report import ReportOptions, read_checks, run_report
 
@@ -180,6 +181,7 @@ def report(
     path = to or file.parent / "report.html"
     must(path.suffix in (".html", ".htm"), "--to", "a file NAME.html", str(path))
     with frames(file, world) as trajectory, pictures.drawing(f"pictures of {file}"):
+        check_lines(trajectory.scene, lines)
         found = _case_pictures(trajectory) if len(trajectory) > 1 else {}
         drawn = {
             name.removesuffix(".png").replace("_", " "): pictures.image(mark_missing(figure, trajectory))
@@ -273,7 +275,7 @@ def movie(
         from tisim.plotting.movie import movie as draw
 
         look = Look.of(colour, view, crop, tuple(clip or ()), lines)
-        check(trajectory, path, rate)
+        check(trajectory, path, rate, look)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with _progress("drawing") as progress:
             draw(trajectory, path, rate, progress, look)

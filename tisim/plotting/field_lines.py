@@ -124,6 +124,21 @@ def dipole_field(
     return mu_0 * total
 
 
+def check_lines(scene: Scene, name: str | None) -> None:
+    """Raise InputError if a scene has no lines of a name; None is of no lines."""
+    sources = _sampled(scene)
+    known = [own for own, one in QUANTITIES.items() if one in sources]
+    if "magnetic" not in known and any(MOMENT in effect.fields for effect in scene.effects):
+        known.append("magnetic")
+    rule = f"one of {', '.join(known)}" if known else "left out in this scene"
+    must(name is None or name in known, "lines", rule, name)
+
+
+def _sampled(scene: Scene) -> set[str]:
+    """Return the quantities that have a source in a scene."""
+    return {one.quantity for one in scene.effects if isinstance(one, Source)}
+
+
 class FieldLines:
     """The lines of one quantity of a scene. It is a context manager.
 
@@ -133,18 +148,12 @@ class FieldLines:
     """
 
     def __init__(self, scene: Scene, name: str) -> None:
-        quantity = QUANTITIES.get(name)
-        sources = {one.quantity for one in scene.effects if isinstance(one, Source)}
-        known = [own for own, one in QUANTITIES.items() if one in sources]
-        if "magnetic" not in known and any(MOMENT in effect.fields for effect in scene.effects):
-            known.append("magnetic")
-        must(
-            name in known, "lines", f"one of {', '.join(known)}" if known else "left out in this scene", name
-        )
+        check_lines(scene, name)
         self.scene, self.name, self.held = scene, name, ExitStack()
+        quantity = QUANTITIES[name]
         self.sampler = (
-            self.held.enter_context(FieldSampler(scene.effects, QUANTITIES[name]))
-            if quantity in sources
+            self.held.enter_context(FieldSampler(scene.effects, quantity))
+            if quantity in _sampled(scene)
             else None
         )
 

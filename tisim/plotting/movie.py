@@ -20,7 +20,7 @@ from tisim.io.reader import Frames
 from tisim.plotting import cloud
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.colours import Colouring, chosen, sample, scaled, values_of
-from tisim.plotting.field_lines import FieldLines
+from tisim.plotting.field_lines import FieldLines, check_lines
 from tisim.plotting.look import USUAL, Look
 from tisim.plotting.scenery import finite_grains, remaining, scenery, window
 from tisim.rendering.camera import Window
@@ -48,7 +48,7 @@ def movie(
     path : ends in .gif, or in .mp4 if ffmpeg or imageio-ffmpeg is installed; raise InputError otherwise.
     progress : called with the finished fraction, 0..1. look : view, crop, cuts and colours.
     """
-    check(frames, path, rate)
+    check(frames, path, rate, look)
     coloured, outermost, part = _scales(frames, look)
     figure = Figure(figsize=(SIDE + LEGEND * (coloured is not None), SIDE), facecolor="white")
     FigureCanvasAgg(figure)
@@ -87,8 +87,10 @@ def while_drawn(path: Path) -> str:
     return f"{path.stem}.new{path.suffix}"
 
 
-def check(frames: Frames, path: Path, rate: int) -> None:
-    """Raise InputError if there are not enough frames, or if there is no writer for such a file."""
+def check(frames: Frames, path: Path, rate: int, look: Look = USUAL) -> None:
+    """Raise InputError if there are not enough frames, if the scene lacks the lines that are wanted, or if
+    there is no writer for such a file."""
+    check_lines(frames.scene, look.lines)
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
     must(len(frames) > 1, "file", "one with 2 frames or more", Words(f"{len(frames)} frames"))
     must(path.suffix in (".gif", ".mp4"), "movie", "a .gif or .mp4 file", path.name)
