@@ -57,6 +57,9 @@ OWN_STYLE = """
 }
 #viewer { margin: 0; }
 .stage canvas { height: min(60vh, 460px); }
+.transport { flex-basis: 200px; min-width: 0; }
+.transport input { min-width: 30px; }
+.clock { min-width: 6em; }
 """
 """Added to the style of reports: a shadow root has no body."""
 
