@@ -61,7 +61,7 @@ def shown_designs(outcome: Outcome, most: int) -> tuple[list[str], list[list[str
     shown, otherwise the first."""
     columns = best_columns(outcome.problem, outcome.hall)
     count = len(outcome.hall)
-    indices = _spread(count, most) if outcome.problem.several else range(min(count, most))
+    indices = spread(count, most) if outcome.problem.several else range(min(count, most))
     return list(columns), [[text(values[k]) for values in columns.values()] for k in indices]
 
 
