@@ -11,9 +11,10 @@ import numpy as np
 from deap import tools
 from numpy.typing import NDArray
 
+from tisim.data_frames import data_frame
+from tisim.notebook import ShownInNotebook
 from tisim.optimize.beginning import NOTHING, Beginning
 from tisim.optimize.evaluation.estimate import FitnessEstimate
-from tisim.optimize.frames import data_frame
 from tisim.optimize.hall_of_fame import HallOfFame, compromise, hall_of_fame
 from tisim.optimize.methods.individual import Individual
 from tisim.optimize.problem.calls import constraint_value
@@ -91,7 +92,7 @@ class Design:
 
 
 @dataclass(repr=False)
-class Outcome:
+class Outcome(ShownInNotebook):
     """The outcome of a search.
 
     hall : the best different designs, best first, ranked by all information of the search (see
@@ -117,6 +118,7 @@ class Outcome:
     identity : see optimize.settings. name : name of its group in the cache file.
     """
 
+    shown_by = "tisim.optimize.report.cell:outcome_cell"
     problem: Problem
     settings: Settings
     identity: Mapping[str, Any]

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tisim.data_frames import data_frame
 from tisim.errors import must
 from tisim.files.regular_file import is_folder
-from tisim.optimize.frames import data_frame
 from tisim.optimize.search_folder import SEARCH_FILE
 from tisim.optimize.search_records import searches
 from tisim.optimize.storage.cache import Cache, existing

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests import scenes
+from tests.browser import browser  # noqa: F401
 from tisim.backend import choice, memory, runtime
 from tisim.backend.taichi import BACKEND
 from tisim.errors import InputError

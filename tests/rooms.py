@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 
 ROOMS = (
     "tisim.version", "tisim.errors", "tisim.interrupt", "tisim.compiling", "tisim.streams", "tisim.console",
-    "tisim.files",
+    "tisim.data_frames", "tisim.files", "tisim.notebook",
     "tisim.backend",
     "tisim.numerics", "tisim.components", "tisim.materials", "tisim.geometry", "tisim.shapes",
     "tisim.domains",
@@ -31,10 +31,11 @@ ROOMS = (
     "tisim.self_consistent", "tisim.population", "tisim.sources",
     "tisim.effects", "tisim.operators", "tisim.steppers", "tisim.scene",
     "tisim.engine", "tisim.describe", "tisim.testing", "tisim.io", "tisim.analysis",
-    "tisim.rendering", "tisim.plotting", "tisim", "tisim.accuracy", "tisim.reading", "tisim.report",
+    "tisim.rendering", "tisim.plotting", "tisim", "tisim.accuracy", "tisim.reading",
+    "tisim.report", "tisim.watch",
     "tisim.optimize.problem", "tisim.optimize.storage", "tisim.optimize.evaluation",
     "tisim.optimize.methods.individual", "tisim.optimize.surrogate", "tisim.optimize.methods",
-    "tisim.optimize.fitness_record", "tisim.optimize.frames", "tisim.optimize.hall_of_fame",
+    "tisim.optimize.fitness_record", "tisim.optimize.hall_of_fame",
     "tisim.optimize.generation_log", "tisim.optimize.tables", "tisim.optimize.designs_csv",
     "tisim.optimize.experiments", "tisim.optimize.beginning", "tisim.optimize.settings",
     "tisim.optimize.outcome", "tisim.optimize.search_records", "tisim.optimize.search_folder",

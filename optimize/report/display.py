@@ -22,7 +22,7 @@ class Display:
     """
 
     def __init__(self, problem: Problem, settings: Settings, console: Console) -> None:
-        self.problem, self.settings, self.console = problem, settings, console
+        self.problem, self.settings = problem, settings
         self.best: Mapping[str, Value] | None = None
         self.bar = progress_bar("{task.fields[reached]}", "{task.fields[best]}", console)
         reached = f"generation 0 of {settings.generations}"
@@ -55,11 +55,11 @@ class Display:
         self.bar.update(self.task, best=best.split("  ")[0])
         runs = f"{where.evaluations} runs" + (f", {where.hits} from the file" if where.hits else "")
         line = f"generation {where.generation:3d}  {best}  ({runs})"
-        self.console.print(line, highlight=False, markup=False)
+        self.bar.console.print(line, highlight=False, markup=False)
         if where.best_design is not None and where.best_design != self.best:
             self.best = where.best_design
             text = f"    {self._design(self.best)}"
-            self.console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
+            self.bar.console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
 
     def _best(self, where: Progress) -> str:
         if not where.best:

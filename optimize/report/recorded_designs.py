@@ -19,7 +19,7 @@ from tisim.optimize.report.search_data import SearchData
 from tisim.optimize.search_folder import different_problem
 from tisim.optimize.settings import Settings, identity
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.run_report import ReportOptions, player_facts, recording
+from tisim.report.viewer_data import ReportOptions, player_facts, recording
 
 RECORDED_FRAMES = 40
 """Number of frames of a recorded design after its start."""

@@ -55,6 +55,16 @@ def best_table(outcome: Outcome) -> RenderableType:
     return Group(*blocks)
 
 
+def shown_designs(outcome: Outcome, most: int) -> tuple[list[str], list[list[str]]]:
+    """Return headings, and a row of text for each of the best designs: genes, objectives and constraints in
+    their units, with 95 % intervals if they are known. Of a front, ``most`` designs spread along it are
+    shown, otherwise the first."""
+    columns = best_columns(outcome.problem, outcome.hall)
+    count = len(outcome.hall)
+    indices = spread(count, most) if outcome.problem.several else range(min(count, most))
+    return list(columns), [[text(values[k]) for values in columns.values()] for k in indices]
+
+
 def notes(outcome: Outcome) -> RenderableType:
     """Return a line if no design satisfies the constraints, and explanations of the headings of
     ``best_table``, a line each; empty if there is no design."""

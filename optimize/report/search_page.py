@@ -10,7 +10,7 @@ import json
 import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,10 @@ from tisim.optimize.report.recorded_designs import RecordedDesign
 from tisim.optimize.report.search_data import Row, RunOfDesign, SearchData, number_or_none, read_search
 from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW, error_of
 from tisim.plotting.colours import WIDE_RANGE
-from tisim.report.page import SEARCH_SCRIPTS, Page, Section, copied_text, table
-from tisim.report.run_report import LONGEST_TOML, SIZE_LIMIT
+from tisim.report.page import SEARCH_SCRIPTS, WATCHED_SEARCH_SCRIPTS, Page, Section, copied_text, table
+from tisim.report.run_report import LONGEST_TOML
 from tisim.report.scenery import colour_maps
+from tisim.report.viewer_data import SIZE_LIMIT
 from tisim.version import __version__
 
 CHOSEN_DESIGN = (
@@ -66,12 +67,21 @@ def search_report(
     return path
 
 
-def search_html(data: SearchData, options: SearchPageOptions | None = None) -> str:
-    """Return the page of a search as HTML. InputError if the limit is too small for a single design."""
+def search_html(
+    data: SearchData, options: SearchPageOptions | None = None, live: Mapping[str, Any] | None = None
+) -> str:
+    """Return the page of a search as HTML. InputError if the limit is too small for a single design.
+
+    live : plain data for the script of a page that is watched; None for a file.
+    """
     chosen = options or SearchPageOptions()
     kept = list(range(len(data)))
     while True:
-        html = search_page(data, chosen, kept).html()
+        page = search_page(data, chosen, kept)
+        if live is not None:
+            facts = {**page.facts, "live": live}
+            page = replace(page, facts=facts, scripts=WATCHED_SEARCH_SCRIPTS, connects=True)
+        html = page.html()
         size = len(html.encode())
         if size <= 1e6 * chosen.limit:
             return html

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 
 import tisim
-from tests.report.conftest import SWITCHES
+from tests.browser import SWITCHES
 from tisim.effects import Granular, Gravity, HertzMaterial, MindlinForce, RestitutionDamping, Walls
 from tisim.geometry import Plane
 from tisim.io.reader import frames
@@ -32,7 +32,7 @@ from tisim.report import run_report
 from tisim.report.compressed_trajectory import compress
 from tisim.report.contact_network import contact_network
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.run_report import ReportOptions
+from tisim.report.viewer_data import ReportOptions
 from tisim.steppers import FixedStep, Verlet
 
 SPACING, STEP, MOST_STEPS = 1.2e-3, 1e-5, 10_000

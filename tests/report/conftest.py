@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,9 +11,6 @@ import pytest
 from tisim import Box, Particles, Scene
 from tisim.io.reader import Frame
 from tisim.io.trajectory import Trajectory, recorded_fields
-
-SWITCHES = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-"""WebGL2 without a graphics card."""
 
 
 def particles(n, **fields):
@@ -49,28 +45,6 @@ def record(tmp_path):
         return path
 
     return write
-
-
-def executable(driver):
-    """The browser of the system, or the one that Playwright has installed; None if there is neither."""
-    found = shutil.which("chromium") or shutil.which("google-chrome")
-    own = driver.chromium.executable_path
-    return found or (own if Path(own).exists() else None)
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """A browser with WebGL2; the test is skipped if there is none."""
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason="needs pip install playwright (the extra browser)"
-    )
-    with playwright.sync_playwright() as driver:
-        path = executable(driver)
-        if path is None:
-            pytest.skip("no chromium: install one, or run python -m playwright install chromium")
-        chromium = driver.chromium.launch(executable_path=path, args=SWITCHES)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture
@@ -129,3 +103,30 @@ def touching(record, rng):
         pairs = np.argwhere(np.triu(depth >= 0, 1))
         expected.append({(int(ids[i]), int(ids[j])): float(depth[i, j]) for i, j in pairs})
     return record(grains, made), expected
+
+
+def growing_packing():
+    """A scene of spheres in a cylinder of four of their diameters, and states in which they grow fourfold.
+
+    The second state has no sphere.
+    """
+    from tisim.effects import Confinement, HardRods
+    from tisim.geometry import CylindricalContainer
+    from tisim.shapes import SpherocylinderShape
+    from tisim.steppers import MechanicalContraction
+
+    balls = HardRods(rods=(SpherocylinderShape(length=0.0, diameter=0.002),))
+    made = scene(
+        2, stepper=MechanicalContraction(),
+        domain=Box(low=(-0.01,) * 3, high=(0.01,) * 3, periodic=(False, False, True)),
+        effects=(balls, Confinement(container=CylindricalContainer(diameter=4.0))),
+    )  # fmt: skip
+    place, turn = np.array([[0.0, 0, -0.005], [0.0, 0, 0.005]]), np.tile([1.0, 0, 0, 0], (2, 1))
+    states = [
+        {
+            "id": np.arange(n), "position": place[:n], "orientation": turn[:n], "radius": np.full(n, radius),
+            "shape": np.zeros(n, int),
+        }
+        for n, radius in ((2, 2.5e-4), (0, 0.0), (2, 1e-3))
+    ]  # fmt: skip
+    return made, states

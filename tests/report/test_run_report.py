@@ -22,9 +22,10 @@ from tisim.effects import Granular, Gravity, Walls
 from tisim.geometry import Plane
 from tisim.io.reader import frames
 from tisim.plotting import style
+from tisim.report import page as pages
 from tisim.report import run_report as write
-from tisim.report.page import COST_SCRIPTS, RUN_SCRIPTS, SEARCH_SCRIPTS
-from tisim.report.run_report import SIZE_LIMIT, ReportOptions, read_checks
+from tisim.report.run_report import read_checks
+from tisim.report.viewer_data import SIZE_LIMIT, ReportOptions
 
 
 def facts_of(path):
@@ -77,7 +78,9 @@ def test_the_wheel_carries_the_static_files():
     root = Path(__file__).parents[2]
     patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]
     names = [path.name for path in (root / "tisim/report/static").iterdir()]
-    assert set(names) == {*RUN_SCRIPTS, *SEARCH_SCRIPTS, *COST_SCRIPTS, "page.css", "page.html"}
+    lists = [value for name, value in vars(pages).items() if name.endswith("_SCRIPTS")]
+    scripts = {name for one in lists for name in one}
+    assert set(names) == {*scripts, "page.css", "page.html"}
     for name in names:
         assert any(fnmatch.fnmatch(f"static/{name}", one) for one in patterns["tisim.report"]), name
 

@@ -15,7 +15,7 @@ from tisim.optimize.report.recorded_designs import RecordedDesign
 from tisim.optimize.report.search_data import read_search
 from tisim.optimize.report.search_page import SearchPageOptions, search_html, search_report
 from tisim.report.kept_frames import KeptFrames
-from tisim.report.run_report import ReportOptions, player_facts, recording
+from tisim.report.viewer_data import ReportOptions, player_facts, recording
 
 pytestmark = pytest.mark.long
 CPU_LIMITS = {"choose": 150.0, "hover": 60.0, "brush": 400.0, "sort": 100.0}

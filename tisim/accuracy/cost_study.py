@@ -10,15 +10,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tisim import version
 from tisim.accuracy.quantity import Quantity, Truth, usual
 from tisim.backend import runtime
+from tisim.data_frames import data_frame
 from tisim.errors import RunError, is_whole, must
+from tisim.notebook import ShownInNotebook
 from tisim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 TRUSTED = 3.0
 """An error counts as known if it is at least this many times its uncertainty."""
@@ -139,7 +144,7 @@ def decades(rows: Sequence[Row], quantity: int = 0) -> dict[float, list[Row]]:
     return by_error
 
 
-class Study:
+class Study(ShownInNotebook):
     """The run time and the error of the settings of a scene, as far as ``run`` has measured them.
 
     quantities : quantities whose errors are measured; by default ``quantity.usual``.
@@ -155,6 +160,8 @@ class Study:
     rows, truths : the results so far, in order; one truth for each quantity.
     complete : whether all settings are measured.
     """
+
+    shown_by = "tisim.accuracy.cell:study_cell"
 
     def __init__(
         self,
@@ -263,6 +270,24 @@ class Study:
         names = [q.name for q in self.quantities]
         must(quantity is None or quantity in names, "quantity", f"one of {', '.join(names)}", quantity)
         return names.index(quantity) if quantity is not None else 0
+
+    def to_frame(self) -> DataFrame:
+        """Return the rows as a pandas data frame: method, setting, work, wall time and its spread, and the
+        relative error of each quantity with its uncertainty.
+
+        ``frame.attrs["units"]`` has the unit of each column that has one. InputError if pandas is not
+        installed.
+        """
+        names = ("method", "setting", "precision", "arithmetic", "starts", "steps", "sums", "rejections")
+        columns: dict[str, list[Any]] = {name: [getattr(row, name) for row in self.rows] for name in names}
+        columns["seconds"] = [row.median for row in self.rows]
+        columns["spread"] = [row.spread for row in self.rows]
+        for k, quantity in enumerate(self.quantities):
+            pairs = [row.errors[k] if row.errors else (math.nan, math.nan) for row in self.rows]
+            columns[f"error of {quantity.name}"] = [error for error, _ in pairs]
+            columns[f"uncertainty of {quantity.name}"] = [uncertainty for _, uncertainty in pairs]
+        columns["failed"] = [row.failed for row in self.rows]
+        return data_frame(columns, {"seconds": "s", "spread": "s"})
 
     def line(self, method: str) -> list[Row]:
         """Return the rows of a method, in the order of its settings."""

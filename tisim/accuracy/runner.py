@@ -28,12 +28,15 @@ from tisim.accuracy.sweep import Setting, SettingSweep, ensembles, methods
 from tisim.accuracy.timing import OBSERVATIONS, Limit, OutOfTime, ResultCallback, SimulationCache, Timed
 from tisim.backend import runtime
 from tisim.components.accuracy_parameter import three_digits
+from tisim.console import progress_bar
 from tisim.engine.result import Result
 from tisim.errors import InputError, RunError, must
 from tisim.scene.scene import Scene
 
 Progress = Callable[[float, str], None]
 """Called with the fraction of the study that is done, 0..1, and a description of the current run."""
+DESCRIPTION_LENGTH = 48
+"""Number of characters of the description of a run that a progress bar shows."""
 REFERENCE_SEED_OFFSET = 1_000_000
 """Offset between the seeds of a random quantity's reference and of its rows, so that no start is shared."""
 REFERENCE_STARTS = 4
@@ -48,10 +51,13 @@ def study(scene: Scene, quantities: Sequence[Quantity] = (), **settings: Any) ->
     return cost_study
 
 
-def run(study: Study, progress: Progress | None = None, finished: Callable[[], object] | None = None) -> None:
+def run(
+    study: Study, progress: Progress | bool | None = None, finished: Callable[[], object] | None = None
+) -> None:
     """Measure all missing rows of a study.
 
-    progress : called with the fraction of the study that is done, 0..1, and a description of the current run.
+    progress : called with the fraction of the study that is done, 0..1, and a description of the current run;
+    True shows a progress bar, on a terminal or in a notebook.
     finished : called after each new row, and after the truths.
 
     InputError if the scene cannot be run or has no setting to vary. If an error is raised, finished rows are
@@ -60,6 +66,14 @@ def run(study: Study, progress: Progress | None = None, finished: Callable[[], o
     """
     if study.complete:
         return
+    if progress is True:
+        with progress_bar("{task.description}") as bar:
+            task = bar.add_task("", total=1.0)
+
+            def shown(fraction: float, what: str) -> None:
+                bar.update(task, completed=fraction, description=what[:DESCRIPTION_LENGTH])
+
+            return run(study, shown, finished)
     with runtime.turn:
         before = runtime.current()
         try:

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from tisim.accuracy import report
+from tisim.accuracy.runner import DESCRIPTION_LENGTH
 from tisim.console import err, progress_bar
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class CostProgress:
     def running(self, fraction: float, what: str) -> None:
         """Show the fraction of the study that is done and the name of the current run."""
         self.fraction = fraction
-        self.bar.update(self.task, completed=fraction, description=what[:48])
+        self.bar.update(self.task, completed=fraction, description=what[:DESCRIPTION_LENGTH])
         if self.bar.disable and what != self.what and not self.study.truths:
             self._print(f"running {what}")
         self.what = what

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,14 +21,14 @@ from tisim.cli.options import (
     Threads,
     nameable,
 )
-from tisim.console import err, progress_bar
+from tisim.console import shown_progress
 from tisim.errors import InputError
 from tisim.files import output_folder, pictures, regular_file
 from tisim.files.output_folder import resumes
 from tisim.streams import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from matplotlib.figure import Figure
 
@@ -62,6 +60,10 @@ Clip = Annotated[
     list[str] | None,
     typer.Option(metavar="PART", help="Part of space that is drawn, in m, such as 'y<0.01'; repeatable."),
 ]
+Lines = Annotated[
+    str | None,
+    typer.Option(metavar="FIELD", help="Field whose lines are drawn: magnetic, electric or flow."),
+]
 IntoFolder = Annotated[
     Path | None,
     typer.Option(
@@ -80,6 +82,7 @@ def plot(
     view: View = "",
     crop: Crop = "",
     clip: Clip = None,
+    lines: Lines = None,
 ) -> None:
     """Draw pictures of a run.
 
@@ -94,7 +97,7 @@ def plot(
         with pictures.drawing(f"{file}"):
             from tisim.plotting.look import Look
 
-            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ())))
+            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ()), lines))
         print_missing(trajectory.missing)
     output_folder.claim(out_folder, drawn, overwrite)
     for name, figure in drawn.items():
@@ -162,7 +165,7 @@ def figures(
     )
     output_folder.claim(out_folder, (output_folder.LOCK,), overwrite)
     with output_folder.lock(out_folder):
-        with file_progress("running") as progress:
+        with shown_progress("running") as progress:
             results = chosen_case.figures(size_name, progress)
         output_folder.claim(out_folder, results, overwrite)
         # Write numbers first, so that a figure that cannot be drawn does not lose them.
@@ -188,6 +191,7 @@ def movie(
     view: View = "",
     crop: Crop = "",
     clip: Clip = None,
+    lines: Lines = None,
 ) -> None:
     """Draw the trajectory of a run as a moving picture.
 
@@ -202,10 +206,10 @@ def movie(
         from tisim.plotting.movie import check, while_drawn
         from tisim.plotting.movie import movie as draw
 
-        look = Look.of(colour, view, crop, tuple(clip or ()))
-        check(trajectory, path, rate)
+        look = Look.of(colour, view, crop, tuple(clip or ()), lines)
+        check(trajectory, path, rate, look)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
-        with file_progress("drawing") as progress:
+        with shown_progress("drawing") as progress:
             draw(trajectory, path, rate, progress, look)
         print_missing(trajectory.missing)
     print(path)
@@ -236,7 +240,7 @@ def export(
     check(file, kind, names)
     out_folder = folder or file.parent
     output_folder.claim(out_folder, file_names(file, kind), overwrite)
-    with file_progress("writing") as progress:
+    with shown_progress("writing") as progress:
         path = write(file, kind, out_folder, progress, names)
     for world in range(count := world_count(file)):
         with frames(file, world) as trajectory:
@@ -274,11 +278,3 @@ def trajectory_file(path: Path) -> Path:
                 f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")
-
-
-@contextmanager
-def file_progress(what: str) -> Iterator[Callable[[float], None]]:
-    """Yield a function that shows a finished fraction as a progress bar on standard error."""
-    with progress_bar("{task.description}", console=err()) as bar:
-        task = bar.add_task(what, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)

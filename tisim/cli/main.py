@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from tisim.backend import choice, runtime
-from tisim.cli import check, cost, describe, effects, hard, inspect, new, report, run, search
+from tisim.cli import check, cost, describe, effects, hard, inspect, new, report, run, search, watch
 from tisim.cli.usage import Command, CommandGroup, UsageError
 from tisim.errors import InputError, RunError
 from tisim.interrupt import exit_code, handle_signals, raise_interrupt
@@ -22,7 +22,7 @@ COMMANDS = (
     run.run, describe.cases, describe.explain, check.check, hard.hard, describe.doctor, effects.effects,
     new.new,
     cost.cost, search.optimize, search.compare, search.cache,
-    inspect.plot, report.report, inspect.figures, inspect.movie, inspect.export,
+    inspect.plot, report.report, watch.watch, inspect.figures, inspect.movie, inspect.export,
 )  # fmt: skip
 """The command functions, in the order of ``tisim --help``; each function name is the command name."""
 WRITERS = ("run", "new", "cost", "optimize", "compare", "plot", "report", "figures", "movie", "export")

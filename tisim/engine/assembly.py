@@ -43,9 +43,10 @@ from tisim.population.spatial_sort import SpatialSort
 from tisim.population.vacated_slots import VacatedSlots
 from tisim.program.evaluation_stage import Enter, EnterAfterEvents, EvaluationStage
 from tisim.program.phases import Item
+from tisim.scene.scene import Scene
 from tisim.self_consistent.self_consistent import SelfConsistentSolver, solver
 from tisim.state.bound import Bound, Peers
-from tisim.state.fields import Field, WorldField, names_of, resolve_world_fields
+from tisim.state.fields import SHARED, Field, WorldField, names_of, resolve_fields, resolve_world_fields
 from tisim.state.state import State
 from tisim.steppers.base import Stepper
 from tisim.steppers.common import EndStep, FinishStep, FirstStep
@@ -84,6 +85,12 @@ def needed_world_fields(
     of_effects = [field for effect in effects for field in effect.required_world_fields()]
     of_stepper = (*stepper.world_fields, *stepper.control.world_fields)
     return resolve_world_fields(of_effects, of_stepper, taken)
+
+
+def units(scene: Scene) -> dict[str, str]:
+    """Return the unit of each particle quantity of a scene, by name."""
+    fields = resolve_fields((*SHARED, *needed_fields(scene.acting(), scene.stepper)))
+    return {field.name: field.unit for field in fields}
 
 
 def measured(effects: Sequence[Effect]) -> dict[str, str]:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, overload
 
 from tisim.backend import memory, runtime
+from tisim.console import shown_progress
 from tisim.engine.crowding import check_places
 from tisim.engine.observer import Observer
 from tisim.engine.result import Result, Status
@@ -252,21 +253,24 @@ def loaded(scenes: Sequence[Scene]) -> Iterator[Simulation]:
 
 
 @overload
-def run(scenes: Scene, progress: Progress | None = None, record: Recording | None = None) -> Result: ...
+def run(
+    scenes: Scene, progress: Progress | bool | None = None, record: Recording | None = None
+) -> Result: ...
 
 
 @overload
 def run(
-    scenes: Sequence[Scene], progress: Progress | None = None, record: Recording | None = None
+    scenes: Sequence[Scene], progress: Progress | bool | None = None, record: Recording | None = None
 ) -> list[Result]: ...
 
 
 def run(
-    scenes: Scene | Sequence[Scene], progress: Progress | None = None, record: Recording | None = None
+    scenes: Scene | Sequence[Scene], progress: Progress | bool | None = None, record: Recording | None = None
 ) -> Result | list[Result]:
     """Run one scene, or many as one batch; return its Result, or a list of Results in order.
 
-    progress : called about four times a second with the finished fraction, 0..1.
+    progress : called about four times a second with the finished fraction, 0..1. True shows a progress bar,
+    on a terminal or in a notebook.
     record : a trajectory to write, such as ``Recording("flow.h5", frames=100)``; it does not change the
     results.
 
@@ -279,12 +283,15 @@ def run(
     """
     if isinstance(scenes, Scene):
         return run([scenes], progress, record)[0]
+    if progress is True:
+        with shown_progress("running") as shown:
+            return run(scenes, shown, record)
     sound = isinstance(scenes, Sequence) and all(isinstance(scene, Scene) for scene in scenes)
     must(sound, "scenes", "a Scene or a list of them (Scene.from_toml reads a file)", scenes)
     with runtime.turn:
         if record is None:
-            results = dict(_batches.run(scenes, progress))
+            results = dict(_batches.run(scenes, progress or None))
         else:
             with record.recorders(scenes, runtime.current().precision) as recorder:
-                results = dict(_batches.run(scenes, progress, recorder=recorder))
+                results = dict(_batches.run(scenes, progress or None, recorder=recorder))
     return [results[index].watched() for index in range(len(scenes))]

@@ -13,10 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tisim.data_frames import data_frame
+from tisim.engine.assembly import measured
 from tisim.errors import is_number, must
 from tisim.state.status import WorldStatus
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from tisim.engine.simulation import Simulation
 
 
@@ -112,6 +116,7 @@ class MeasureSeries(Observer):
         must(is_number(interval) and interval > 0, "interval", "a number of s above 0", interval)
         self.interval = interval
         self._rows: list[list[dict[str, float]]] = []
+        self._units: list[dict[str, str]] = []
 
     def pause(self, simulation: Simulation) -> np.ndarray:
         return np.array([self._due(rows) for rows in self._rows])
@@ -119,6 +124,7 @@ class MeasureSeries(Observer):
     def observe(self, simulation: Simulation) -> None:
         s = simulation.s
         self._rows = self._rows or [[] for _ in simulation.scenes]
+        self._units = self._units or [measured(scene.effects) for scene in simulation.scenes]
         now = s.snapshot(("time", "status", "count", *s.counters))
         new = []
         for w, rows in enumerate(self._rows):
@@ -136,6 +142,15 @@ class MeasureSeries(Observer):
 
     def __len__(self) -> int:
         return len(self._rows)
+
+    def to_frame(self, world: int = 0) -> DataFrame:
+        """Return the series of a world as a pandas data frame, a row for each entry.
+
+        ``frame.attrs["units"]`` has the unit of each column that has one. InputError if pandas is not
+        installed, or if there is no such world.
+        """
+        must(0 <= world < len(self), "world", f"0 to {len(self) - 1}, after a run", world)
+        return data_frame(self[world], {"time": "s"} | self._units[world])
 
     def _due(self, rows: list[dict[str, float]]) -> float:
         """Return the time (s) of the next entry."""

@@ -6,11 +6,16 @@ import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
+from tisim.data_frames import data_frame, vector_columns
 from tisim.errors import RunError, RunWarning
+from tisim.notebook import VIEWER_HEIGHT, ShownInNotebook, ViewerCell, named
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 RUNNING = "running"
 """The reason of a world that has not ended yet."""
@@ -33,7 +38,7 @@ class Status:
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(ShownInNotebook):
     """The result of the run of one scene.
 
     If the run failed, ``tisim.run`` gives a ``RunWarning`` when ``state`` or ``measures`` is read, or the
@@ -53,6 +58,7 @@ class Result:
     ``Simulation.state`` during the run; the scene and ``start`` then do not describe the run completely.
     """
 
+    shown_by = "tisim.report.cells:result_cell"
     scene: Scene
     state: Arrays
     start: Arrays
@@ -68,6 +74,27 @@ class Result:
         if self.status.failed:
             raise RunError(f"{self.scene.name}: {self.status.reason}")
         return self
+
+    def view(self, height: int = VIEWER_HEIGHT, **options: Any) -> ViewerCell:
+        """Return a viewer of the start and the end, which a notebook shows in the output of a cell.
+
+        height : pixels. options : of ``tisim.report.view``, which shows whole trajectories too.
+        """
+        viewer: ViewerCell = named("tisim.report.view:view")(self, height, **options)
+        return viewer
+
+    def to_frame(self, *, start: bool = False) -> DataFrame:
+        """Return the particles at the end as a pandas data frame, one row each.
+
+        A vector has three columns, such as ``velocity_x``. ``frame.attrs["units"]`` has the unit of each
+        column that has one. start : return the initial state instead.
+
+        InputError if pandas is not installed.
+        """
+        from tisim.engine.assembly import units
+
+        columns, unit_of = vector_columns(self.start if start else self.state, units(self.scene))
+        return data_frame(columns, unit_of)
 
     def watched(self) -> Self:
         """Return the result itself, and from now on warn a user who does not read its status."""

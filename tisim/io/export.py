@@ -14,10 +14,10 @@ import numpy as np
 from tisim.domains.domain import Domain
 from tisim.effects.walls.placement import PlacedWalls, placed_walls
 from tisim.effects.walls.walls import Walls
+from tisim.engine.assembly import units
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
 from tisim.io.reader import Frame, Frames, frames, world_count
-from tisim.io.run_folder import units
 from tisim.io.trajectory import Trajectory
 from tisim.scene.initial_state import Arrays
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast, overload
 
 import h5py
 import numpy as np
@@ -27,8 +27,12 @@ from tisim.files import checksum, regular_file
 from tisim.files.hdf5 import SIGNATURE, SIZE, SharedFile, is_valid
 from tisim.interrupt import defer_signals
 from tisim.io import h5md
+from tisim.notebook import VIEWER_HEIGHT, ShownInNotebook, ViewerCell, named
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 TIME_ROUNDING = 1e-9
 """Relative rounding error allowed for the sum of all steps compared with the duration."""
@@ -182,12 +186,14 @@ def world_count(path: str | Path) -> int:
         return len(file.read(_world_groups))
 
 
-class RecordedWorld(Sequence[Frame]):
+class RecordedWorld(Sequence[Frame], ShownInNotebook):
     """The frames of a world, a sequence in order of time: ``len``, index, slice, iteration.
 
     Frames are read on access. Frames that a running simulation adds are included when ``len`` is called
     again.
     """
+
+    shown_by = "tisim.report.cells:trajectory_cell"
 
     def __init__(self, path: Path, world: int) -> None:
         self._path, self._world = path, world
@@ -234,6 +240,23 @@ class RecordedWorld(Sequence[Frame]):
     def __iter__(self) -> Iterator[Frame]:
         with self._frames() as sequence:
             yield from sequence
+
+    def view(self, height: int = VIEWER_HEIGHT, **options: Any) -> ViewerCell:
+        """Return a viewer of the frames, which a notebook shows in the output of a cell.
+
+        height : pixels. options : of ``tisim.report.view``.
+        """
+        viewer: ViewerCell = named("tisim.report.view:view")(self, height, **options)
+        return viewer
+
+    def to_frame(self) -> DataFrame:
+        """Return the time series as a pandas data frame, a row for each frame: time, number of particles,
+        kinetic energy, displacement and velocity of the centre of gravity, and the measures of effects.
+
+        ``frame.attrs["units"]`` has the unit of each column that has one. InputError if pandas is not
+        installed.
+        """
+        return cast("DataFrame", named("tisim.plotting.time_series:time_series_frame")(self))
 
     def __repr__(self) -> str:
         return f"<{len(self)} frames of world {self._world} in {self._path}>"

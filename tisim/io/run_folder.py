@@ -23,7 +23,7 @@ import numpy as np
 from tisim import version
 from tisim.backend import runtime
 from tisim.components import serialization
-from tisim.engine.assembly import needed_fields
+from tisim.engine.assembly import units
 from tisim.engine.result import Result, Status
 from tisim.errors import InputError, must
 from tisim.files import checksum, output_folder, pictures, regular_file
@@ -33,7 +33,6 @@ from tisim.io.reader import RESULT, frames, refuse_damage, world_count
 from tisim.scene import plugins
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
-from tisim.state.fields import SHARED, resolve_fields
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -178,12 +177,6 @@ def result_in(file: h5py.File) -> Result:
             settings=json.loads(file.attrs["settings"]),
             measures={name: float(value) for name, value in file["measures"].attrs.items()},
         )
-
-
-def units(scene: Scene) -> dict[str, str]:
-    """Return the unit of each particle quantity of a scene, by name."""
-    fields = resolve_fields((*SHARED, *needed_fields(scene.acting(), scene.stepper)))
-    return {field.name: field.unit for field in fields}
 
 
 def _write_arrays(group: h5py.Group, arrays: Arrays, unit_of: dict[str, str]) -> None:

@@ -14,8 +14,8 @@ from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from tisim.engine.assembly import units
 from tisim.errors import InputError, abbreviated, did_you_mean
-from tisim.io.run_folder import units
 from tisim.plotting.style import TIME, quantity
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from tisim.data_frames import data_frame, vector_columns
+from tisim.engine.assembly import measured
 from tisim.errors import Words, must
 from tisim.io.reader import Frames
 from tisim.plotting.cloud import start_and_end
 from tisim.plotting.look import USUAL, Look
 from tisim.plotting.style import AXIS_COLOURS, empty, legend_above, letters, plain, quantity, scale_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,21 @@ def history(frames: Frames) -> TimeSeries:
     begun = int(np.argmax(np.array(number) > 0))
     shift = np.array(centre) - centre[begun]
     return TimeSeries(frames.times, np.array(energy), shift, np.array(drift), np.array(number))
+
+
+def time_series_frame(frames: Frames) -> DataFrame:
+    """Return the time series and the measures of a run as a pandas data frame, a row for each frame.
+
+    InputError if pandas is not installed.
+    """
+    series = history(frames)
+    arrays = {
+        "time": series.time, "particles": series.number, "kinetic_energy": series.kinetic_energy,
+        "shift": series.shift, "drift": series.drift,
+    }  # fmt: skip
+    units = {"time": "s", "kinetic_energy": "J", "shift": "m", "drift": "m/s"}
+    columns, unit_of = vector_columns(arrays, units)
+    return data_frame(columns | dict(frames.measures), unit_of | measured(frames.scene.effects))
 
 
 def _mean(values: np.ndarray, mass: np.ndarray) -> np.ndarray:

@@ -21,10 +21,10 @@ import numpy as np
 from tisim.domains.domain import Domain
 from tisim.effects.base import Shaped
 from tisim.effects.base.shaped import ORIENTATION
+from tisim.engine.assembly import units
 from tisim.errors import Words, must
 from tisim.io.h5md import ABSENT
 from tisim.io.reader import Frame
-from tisim.io.run_folder import units
 from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.columns import WHOLE_TYPES, Column, Scale, column, rounded, uniform_scale, whole_numbers
 from tisim.scene.initial_state import Arrays
@@ -104,12 +104,17 @@ class CompressedTrajectory:
 
 
 def compress(
-    frames: FrameSequence, chosen: Sequence[int], part: int = 1, names: Sequence[str] | None = None
+    frames: FrameSequence,
+    chosen: Sequence[int],
+    part: int = 1,
+    names: Sequence[str] | None = None,
+    logarithmic: bool = True,
 ) -> CompressedTrajectory:
     """Return chosen frames of a run, compressed.
 
     chosen : increasing indices of frames. part : 1 for all particles; otherwise those whose id is a multiple
         of it. names : quantities for colours; None for all that frames have (see ``quantities``).
+    logarithmic : whether quantities whose values spread over decades have logarithmic scales.
 
     Raise InputError if there are no frames, or if a quantity does not exist.
     """
@@ -119,6 +124,8 @@ def compress(
     for name in names or ():
         must(name in known, "field", f"one of {', '.join(known)}", name)
     wanted = [name for name in known if names is None or name in (*names, "radius", "shape")]
+    for name in () if logarithmic else wanted:
+        survey.ranges[name].linear = True
     columns = _columns(frames, chosen, part, survey, wanted)
     times = np.asarray(frames.times)[list(chosen)]
     return CompressedTrajectory(
@@ -164,6 +171,7 @@ class _Range:
     whole: bool
     finite: bool
     sample: list[np.ndarray]
+    linear: bool = False
 
 
 def _part(frame: Frame, part: int) -> Arrays:
@@ -323,7 +331,7 @@ def _scale(found: _Range, bits: int) -> Scale:
 
 def _spreads(found: _Range) -> bool:
     """Return whether a logarithmic scale suits a quantity."""
-    if not (found.low > 0 and found.high > WIDE_RANGE * found.low):
+    if found.linear or not (found.low > 0 and found.high > WIDE_RANGE * found.low):
         return False
     return float(np.median(np.concatenate(found.sample))) < 0.1 * found.high
 

@@ -15,7 +15,7 @@ from tisim.accuracy.storage import StoredStudy, stored
 from tisim.errors import must
 from tisim.files.atomic import replace_file
 from tisim.report.page import COST_SCRIPTS, Page, Section, copied_text, table
-from tisim.report.run_report import SIZE_LIMIT
+from tisim.report.viewer_data import SIZE_LIMIT
 from tisim.version import __version__
 
 CHOSEN_SETTING = (

@@ -26,6 +26,9 @@ RUN_SCRIPTS = (*COMMON_SCRIPTS, *PARTICLE_SCRIPTS, "run.js")
 COST_SCRIPTS = (*COMMON_SCRIPTS, *PLOT_SCRIPTS, "cost.js")
 SEARCH_SCRIPTS = (*COMMON_SCRIPTS, *PARTICLE_SCRIPTS, *PLOT_SCRIPTS, "parallel.js", "search.js")
 """The scripts of the pages of a run, of a study of costs and of a search, in order; the last one begins."""
+WATCHED_RUN_SCRIPTS = (*RUN_SCRIPTS[:-1], "joined.js", "run.js", "live.js", "watch.js")
+WATCHED_SEARCH_SCRIPTS = (*SEARCH_SCRIPTS, "live.js", "watch_search.js")
+"""The scripts of pages that are watched."""
 PARTICLE_VIEW = '<section id="viewer" class="waiting" aria-label="Particles"></section>'
 """The place of the view of the particles."""
 
@@ -46,7 +49,9 @@ class Page:
     title : text. state : "ok", "failed" or "unfinished". verdict, summary : text beside and below the title.
     notices : sentences above the view. sections : in order. footer : paragraphs.
     facts : plain data for the scripts. recording : bytes for them.
+    kind : "report", or "cell" for the output of a cell of a notebook, which shows the view alone.
     scripts : names of files in ``static``. view : HTML above the sections.
+    connects : whether its scripts may connect to the server of the page.
     """
 
     title: str
@@ -58,19 +63,22 @@ class Page:
     notices: Sequence[str] = ()
     sections: Sequence[Section] = ()
     footer: Sequence[str] = field(default_factory=tuple)
+    kind: str = "report"
     scripts: Sequence[str] = RUN_SCRIPTS
     view: str = PARTICLE_VIEW
+    connects: bool = False
 
     def html(self) -> str:
         """Return the page as HTML."""
         style, script = static("page.css"), f'"use strict";\n{"".join(map(static, self.scripts))}'
         policy = (
             f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; img-src data: blob:; "
-            "base-uri 'none'; form-action 'none'"
+            "base-uri 'none'; form-action 'none'" + "; connect-src 'self'" * self.connects
         )
         links = "".join(f'<a href="#{one.name}">{escape(one.title)}</a>' for one in self.sections)
         return Template(static("page.html")).substitute(
             policy=policy,
+            kind=escape(self.kind),
             version=escape(__version__),
             title=escape(self.title),
             style=style,
@@ -88,7 +96,7 @@ class Page:
             ),
             footer="\n".join(f"<p>{escape(text)}</p>" for text in self.footer),
             facts=embedded(self.facts),
-            recording=base64.b64encode(self.recording).decode(),
+            recording=text_data(self.recording),
             script=script,
         )
 
@@ -102,6 +110,11 @@ def embedded(data: Any) -> str:
     """Return data as JSON that can stand in an HTML element: no text in it ends the element."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def text_data(data: bytes) -> str:
+    """Return bytes as text in base64."""
+    return base64.b64encode(data).decode()
 
 
 def _hash(text: str) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import cast
@@ -23,47 +22,23 @@ from tisim.plotting.style import superscripts
 from tisim.reading import read
 from tisim.report import tables
 from tisim.report.columns import Column
-from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence, compress
-from tisim.report.contact_network import ContactNetwork, contact_network, has_contacts
+from tisim.report.compressed_trajectory import CompressedTrajectory
 from tisim.report.kept_frames import KeptFrames
 from tisim.report.page import Page, Section, copied_text, picture, table
-from tisim.report.scenery import colour_maps, scenery
+from tisim.report.viewer_data import ReportOptions, viewer_data
 from tisim.scene.initial_state import Arrays
 from tisim.scene.scene import Scene
 from tisim.version import __version__
 
-SIZE_LIMIT = 15.0
-"""Default for the largest size of a report, MB (10^6 bytes)."""
-RESERVED_BYTES, LEAST_ROOM, SIZE_ATTEMPTS = 0.25e6, 0.1e6, 4
-"""Bytes that are reserved at first for everything but the recording and the pictures, and the least for the
-recording; the number of attempts to keep the limit with more reserved."""
+RESERVED_BYTES, SIZE_ATTEMPTS = 0.25e6, 4
+"""Bytes that are reserved at first for everything but the recording and the pictures, and the number of
+attempts to keep the limit with more reserved."""
 LONGEST_VALUE = 160
 """Number of characters of a setting that are shown in the table."""
 LONGEST_TOML = 200_000
 """Number of characters from which on a scene is not shown as text."""
 CHECKS = ("case", "check", "measured", "half_interval", "expected", "allowed", "verdict")
 """Columns of the file of checks that are shown."""
-
-
-@dataclass(frozen=True)
-class ReportOptions:
-    """The choices for a report.
-
-    limit : largest size of the file, MB. Frames are left out until it is kept, and the page says so.
-    fields : quantities of the particles for colours; None for all.
-    contacts : whether to store the contacts of grains.
-    pictures : further pictures as PNG, by title.
-    checks : rows of text of a table of checks, from ``read_checks``.
-    """
-
-    limit: float = SIZE_LIMIT
-    fields: Sequence[str] | None = None
-    contacts: bool = True
-    pictures: Mapping[str, bytes] = field(default_factory=dict)
-    checks: Sequence[Sequence[str]] = ()
-
-    def __post_init__(self) -> None:
-        must(0.5 <= self.limit < np.inf, "limit", "at least 0.5 MB, and finite", self.limit)
 
 
 def read_checks(path: Path) -> list[list[str]]:
@@ -92,7 +67,7 @@ def run_report(
     """
     chosen, path, reserved = options or ReportOptions(), Path(to), RESERVED_BYTES
     with frames(file, world) as sequence:
-        kept, result = KeptFrames(sequence), _result(Path(file), sequence.scene)
+        kept, result = KeptFrames(sequence), result_of(Path(file), sequence.scene)
         for _ in range(SIZE_ATTEMPTS):
             page = run_page(kept, chosen, result, reserved)
             content = page.html().encode()
@@ -119,30 +94,24 @@ def run_page(
     # The function asks for a scene, times and frames alone.
     series = time_series.history(cast(Frames, sequence))
     times, panels = tables.time_series(series, scene, sequence.measures)
-    trajectory, network, notices = recording(sequence, options, reserved)
-    state, verdict, sentences = _status(sequence, result)
+    data = viewer_data(sequence, options, reserved)
+    state, verdict, sentences = status_of(sequence.missing, result)
     first, last = sequence[0].arrays, sequence[-1].arrays
-    played, data = player_facts(sequence, trajectory, network)
-    facts = {
-        **played, "series": {"times": tables.digits(times), "curves": panels}, "maps": colour_maps(),
-    }  # fmt: skip
     ends = len(first["mass"]), len(last["mass"])
-    shown = f"{len(trajectory.times)} of {count}" if len(trajectory.times) < count else f"{count}"
-    number = f"{ends[0]:,}" if ends[0] == ends[1] else f"{ends[0]:,} at the start, {ends[1]:,} at the end"
     return Page(
         title=scene.name,
         state=state,
         verdict=verdict,
-        summary=f"Particles: {number}. Frames: {shown}, from t = {times[0]:.6g} s to {times[-1]:.6g} s.",
-        facts=facts,
-        recording=data,
-        notices=[*sentences, *notices],
+        summary=summary(ends, len(data.trajectory.times), count, (times[0], times[-1])),
+        facts=data.facts | {"series": {"times": tables.digits(times), "curves": panels}},
+        recording=data.recording,
+        notices=[*sentences, *data.notices],
         sections=list(_sections(scene, result, (first, last), options)),
-        footer=[_rounding(trajectory), _versions(result)],
+        footer=[rounding(data.trajectory), _versions(result)],
     )
 
 
-def _result(file: Path, scene: Scene) -> Result | None:
+def result_of(file: Path, scene: Scene) -> Result | None:
     """Return the result of the run, if it has ended."""
     path = file if file.name == "result.h5" else file.with_name("result.h5")
     if not regular_file.exists(path):
@@ -155,91 +124,30 @@ def _result(file: Path, scene: Scene) -> Result | None:
     return result if same else None
 
 
-def _status(sequence: KeptFrames, result: Result | None) -> tuple[str, str, list[str]]:
-    """Return the state, a word for it, and sentences about it."""
+def status_of(missing: str, result: Result | None) -> tuple[str, str, list[str]]:
+    """Return the state of a run, a word for it, and sentences about it. missing : see ``Frames.missing``."""
     if result is None:
-        reached = sequence.missing
         return (
-            ("unfinished", "unfinished", [f"{reached[0].upper()}{reached[1:]}."])
-            if reached
+            ("unfinished", "unfinished", [f"{missing[0].upper()}{missing[1:]}."])
+            if missing
             else ("ok", "complete", [])
         )
     status = result.status
     return ("ok", "ok", []) if status.ok else ("failed", "failed", [f"The run failed {status.reason}."])
 
 
-def player_facts(
-    sequence: FrameSequence, trajectory: CompressedTrajectory, network: ContactNetwork | None
-) -> tuple[dict[str, object], bytes]:
-    """Return what a browser needs to play a run: plain data, and the compressed frames."""
-    parts = [one.data for one in trajectory.columns] + ([network.data()] if network is not None else [])
-    facts: dict[str, object] = {
-        "name": sequence.scene.name, "trajectory": trajectory.facts(), "lengths": [len(one) for one in parts],
-        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
-        "materials": list(sequence.scene.materials),
-    }  # fmt: skip
-    return facts, b"".join(parts)
-
-
-def recording(
-    sequence: FrameSequence, options: ReportOptions, reserved: float
-) -> tuple[CompressedTrajectory, ContactNetwork | None, list[str]]:
-    """Return the frames that the limit allows, with their contacts, and sentences about those left out."""
-    room = options.limit * 1e6 - reserved - sum(4 / 3 * len(png) for png in options.pictures.values())
-    room = 0.75 * max(room, LEAST_ROOM)
-    count, particles = len(sequence), max(len(sequence[k].arrays["id"]) for k in (0, -1))
-    # A particle usually takes a byte or more in a frame; frames that would hardly fit are not read.
-    stride, part = max(1, int(count * particles // room)), 1
-    while True:
-        chosen = sorted({*range(0, count, stride), count - 1})
-        trajectory = compress(sequence, chosen, part, options.fields)
-        excess = trajectory.size() / room
-        if excess <= 1:
-            break
-        if len(chosen) > 2:
-            stride = min(max(stride + 1, int(stride * excess)), max(count - 1, 1))
-        else:
-            part = max(part + 1, int(part * excess) + 1)
-    notices = []
-    if len(chosen) < count:
-        notices.append(
-            f"To keep this file below {options.limit:g} MB, it has one frame in {stride} and the last: "
-            f"{len(chosen)} of {count}. The curves below use all frames."
-        )
-    if part > 1:
-        notices.append(f"Only particles whose id is a multiple of {part} are shown, for the same reason.")
-    network = None
-    if options.contacts and has_contacts(sequence.scene):
-        network = contact_network(sequence, trajectory)
-        if network is not None and trajectory.size() + len(network.data()) > room:
-            network = None
-            notices.append("The contacts are left out, because they do not fit this size.")
-    return trajectory, network, notices
+def summary(ends: tuple[int, int], shown: int, count: int, times: tuple[float, float]) -> str:
+    """Return a sentence about the numbers of particles at both ends, of frames, and their times (s)."""
+    number = f"{ends[0]:,}" if ends[0] == ends[1] else f"{ends[0]:,} at the start, {ends[1]:,} at the end"
+    frames_shown = f"{shown} of {count}" if shown < count else f"{count}"
+    return f"Particles: {number}. Frames: {frames_shown}, from t = {times[0]:.6g} s to {times[1]:.6g} s."
 
 
 def _sections(
     scene: Scene, result: Result | None, states: tuple[Arrays, Arrays], options: ReportOptions
 ) -> list[Section]:
     """Return the sections below the view."""
-    happened = '<div id="curves"></div>\n<h3>Balances</h3>' + table(
-        ("quantity", "unit", "start", "end", "change"),
-        [
-            (name, unit, f"{start:.10g}", f"{end:.10g}", f"{end - start:.3g}")
-            for name, unit, start, end in tables.balances(*states)
-        ],
-        "balances",
-        (2, 3, 4),
-    )
-    if result is not None and (result.work or result.measures):
-        happened += "<h3>Counts and measures at the end</h3>" + table(
-            ("quantity", "value"),
-            [
-                *((name.replace("_", " "), f"{number}") for name, number in result.work.items()),
-                *((name.replace("_", " "), f"{value:.8g}") for name, value in result.measures.items()),
-            ],
-            "counts",
-            (1,),
-        )
+    happened = f'<div id="curves"></div>\n<div id="numbers">{numbers(result, states)}</div>'
     sections = [
         Section("happened", "What happened", happened),
         Section("asked", "What was asked", _asked(scene)),
@@ -251,6 +159,30 @@ def _sections(
         shown = "\n".join(picture(title, png) for title, png in options.pictures.items())
         sections.append(Section("pictures", "Pictures", f'<div class="pictures">{shown}</div>'))
     return sections
+
+
+def numbers(result: Result | None, states: tuple[Arrays, Arrays]) -> str:
+    """Return the balances between two states, and the counts and measures of a run, as HTML."""
+    html = "<h3>Balances</h3>" + table(
+        ("quantity", "unit", "start", "end", "change"),
+        [
+            (name, unit, f"{start:.10g}", f"{end:.10g}", f"{end - start:.3g}")
+            for name, unit, start, end in tables.balances(*states)
+        ],
+        "balances",
+        (2, 3, 4),
+    )
+    if result is not None and (result.work or result.measures):
+        html += "<h3>Counts and measures at the end</h3>" + table(
+            ("quantity", "value"),
+            [
+                *((name.replace("_", " "), f"{number}") for name, number in result.work.items()),
+                *((name.replace("_", " "), f"{value:.8g}") for name, value in result.measures.items()),
+            ],
+            "counts",
+            (1,),
+        )
+    return html
 
 
 def _asked(scene: Scene) -> str:
@@ -308,7 +240,7 @@ def _setting_row(row: Sequence[str], off: bool = False) -> str:
     )
 
 
-def _rounding(trajectory: CompressedTrajectory) -> str:
+def rounding(trajectory: CompressedTrajectory) -> str:
     """Return sentences about the rounding of the quantities shown."""
     position = trajectory.column("position")
     others = [one for one in trajectory.columns if one.name not in ("id", "position", "orientation", "shape")]

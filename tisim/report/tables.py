@@ -96,16 +96,19 @@ def balances(first: Arrays, last: Arrays) -> list[tuple[str, str, float, float]]
 
 
 def time_series(
-    series: TimeSeries, scene: Scene, measures: Mapping[str, np.ndarray]
+    series: TimeSeries, scene: Scene, measures: Mapping[str, np.ndarray], *, number: bool = False
 ) -> tuple[np.ndarray, list[dict[str, object]]]:
     """Return times (s) and panels of curves as plain data: the quantities of a ``TimeSeries``, and the
-    measures of the effects."""
+    measures of the effects.
+
+    number : whether to return the number of particles even if it is constant.
+    """
     chosen = slice(None, None, -(-len(series.time) // MOST_POINTS) or 1)
-    panels = [*_standard(series, scene), *_measured(scene, measures)]
+    panels = [*_standard(series, scene, number), *_measured(scene, measures)]
     return series.time[chosen], [panel.facts(chosen) for panel in panels]
 
 
-def _standard(series: TimeSeries, scene: Scene) -> Iterator[Curves]:
+def _standard(series: TimeSeries, scene: Scene, number: bool) -> Iterator[Curves]:
     flow = " relative to the flow" if scene.domain.shears() else ""
     energy = series.kinetic_energy
     positive = energy[energy > 0]
@@ -116,7 +119,7 @@ def _standard(series: TimeSeries, scene: Scene) -> Iterator[Curves]:
     title = "velocity of the centre of gravity" if jumps else "displacement of the centre of gravity"
     curves = tuple((axis, vector[:, k]) for k, axis in enumerate("xyz"))
     yield Curves(f"{title}{flow}", "m/s" if jumps else "m", curves)
-    if np.ptp(series.number):
+    if number or np.ptp(series.number):
         yield Curves("number of particles", "", (("", series.number.astype(float)),))
 
 

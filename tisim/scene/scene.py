@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -20,6 +20,7 @@ from tisim.errors import InputError, Words, abbreviated, must
 from tisim.files import python_file
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Material, MaterialPair, Materials
+from tisim.notebook import ShownInNotebook
 from tisim.operators.base import adding
 from tisim.scene import plain_data, plugins
 from tisim.scene.initial_state import Arrays, Start
@@ -35,12 +36,14 @@ scene."""
 __all__ = ["Box", "Open", "Scene", "ShearedBox"]
 
 
-class Scene(Component):
+class Scene(Component, ShownInNotebook):
     """A scene describes a simulation: particles, the effects that act on them, and the duration.
 
     Only the effects in a scene are compiled and allocated. A scene is made in Python or read from a TOML
     file; InputError ("X must be Y; received Z") is raised if it cannot be run.
     """
+
+    shown_by: ClassVar[str] = "tisim.report.cells:scene_cell"
 
     name: Text = option("descriptive name of the scene", "scene")
     particles: Start = option("initial state, such as Particles or Cloud")

@@ -131,6 +131,21 @@ class Chart {
     this.mark();
   }
 
+  /** Adds points, or replaces all. curves : label and values of each curve. */
+  extend(times, curves, all = false) {
+    const { facts } = this;
+    if (all) facts.curves.forEach((one) => { one.values = []; });
+    // All charts of a page share their first times.
+    this.times = [...(all ? [] : this.times), ...times];
+    for (const one of facts.curves) {
+      const values = curves.find((own) => own.label === one.label)?.values ?? [];
+      one.values.push(...times.map((_, k) => values[k] ?? null));
+    }
+    this.wide = null;
+    this.drawing.setAttribute("aria-label", this.summary());
+    this.draw();
+  }
+
   nearest(time) {
     let low = 0, high = this.times.length - 1;
     while (high - low > 1) {

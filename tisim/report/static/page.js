@@ -7,15 +7,15 @@ function json(id) {
   return JSON.parse(document.getElementById(id).textContent);
 }
 
-function tables() {
-  for (const table of document.querySelectorAll("table[data-csv]")) {
+function tables(place = document) {
+  for (const table of place.querySelectorAll("table[data-csv]")) {
     const save = () => {
       const rows = [...table.rows].map((row) => [...row.cells].map((cell) => cell.textContent.trim()));
       download(`${table.dataset.csv}.csv`, csv(rows), "text/csv");
     };
     table.parentNode.before(element("div", { class: "buttons after" }, element("button", { type: "button", onclick: save, "aria-label": `Save ${table.dataset.csv} as CSV` }, "CSV")));
   }
-  for (const text of document.querySelectorAll("pre[data-file]")) text.before(copying(text, text.dataset.file));
+  for (const text of place.querySelectorAll("pre[data-file]")) text.before(copying(text, text.dataset.file));
 }
 
 /** Buttons that copy the text of an element, and save it as a file. */

@@ -24,9 +24,7 @@ class Player {
     this.scene = scene;
     this.build();
     this.listen();
-    const colours = trajectory.quantities().filter((one) => !one.constant);
-    const first = ["temperature", "speed", "material", "shape", "radius"].map((name) => colours.find((one) => one.name === name)).find(Boolean);
-    this.colourBy((first ?? colours[0])?.name ?? "");
+    this.firstColour();
     this.viewer.show(0);
     new ResizeObserver(() => { this.viewer.resize(); this.overlay(); }).observe(this.canvas);
     this.viewer.listeners.push(() => this.overlay());
@@ -61,16 +59,16 @@ class Player {
     const stage = element("div", { class: "stage" }, this.canvas, this.legend, this.bar, this.triad, this.note);
     this.stage = stage;
 
-    const changing = trajectory.quantities().filter((one) => !one.constant);
-    this.colour = choice("Colour", [["", "one colour"], ...changing.map((one) => [one.name, this.label(one)])], (name) => this.colourBy(name));
+    this.colour = choice("Colour", [], (name) => { this.chosenColour = true; this.colourBy(name); });
     this.maps = choice("Map", Object.keys(this.facts.maps).map((one) => [one, one]), () => this.applyMap());
     this.low = element("input", { type: "text", inputmode: "decimal", "aria-label": "Lower end of the colours", onchange: () => this.ranged() });
     this.high = element("input", { type: "text", inputmode: "decimal", "aria-label": "Upper end of the colours", onchange: () => this.ranged() });
     const range = element("fieldset", { class: "range" }, element("legend", {}, "Range"), this.low, element("span", {}, "to"), this.high,
       button("this frame", "Range of this frame", () => this.rangeOfFrame()));
     this.rangeBox = range;
-    const sizes = choice("Size", [["", "radius"], ...changing.filter((one) => one.name !== "radius").map((one) => [one.name, this.label(one)])],
-      (name) => this.viewer.set({ size: name || null }));
+    const sizes = choice("Size", [], (name) => this.viewer.set({ size: name || null }));
+    this.sizes = sizes;
+    this.offer();
     const scale = element("input", { type: "range", min: -1.5, max: 1.5, step: 0.05, value: 0, "aria-label": "Size of the particles",
       oninput: () => this.viewer.set({ scale: 2 ** Number(scale.value) }) });
     const search = element("input", { type: "text", inputmode: "numeric", size: 8, onchange: () => this.find(search.value) });
@@ -82,6 +80,7 @@ class Player {
     const shown = [];
     if (scene.bodies.length) shown.push(check("walls", true, (on) => this.viewer.set({ walls: on })));
     if (scene.box) shown.push(check("box", true, (on) => this.viewer.set({ box: on })));
+    if (scene.lines) shown.push(check(`${scene.lines.name} lines at ${quantity(scene.lines.time, "s")}`, true, (on) => this.viewer.set({ lines: on })));
     if (this.network) shown.push(check("contacts", false, (on) => this.viewer.set({ contacts: on })));
     shown.push(check("outlines", true, (on) => this.viewer.set({ outlines: on })));
     shown.push(check("perspective", true, (on) => this.viewer.set({ flat: !on })));
@@ -96,7 +95,7 @@ class Player {
     this.place.append(stage,
       group("Playback", element("div", { class: "transport" },
         button(icon("M4 3h2v10H4z M13 3v10L7 8z"), "First frame", () => { this.play(false); this.go(0); }), this.playButton, this.slider, this.clock), rate.label),
-      element("details", { class: "settings", open: innerWidth > 700 }, element("summary", {}, "Colours, sizes, cut, view, downloads"),
+      element("details", { class: "settings", open: innerWidth > 700 && !document.body.classList.contains("cell") }, element("summary", {}, "Colours, sizes, cut, view, downloads"),
         element("div", { class: "columns" }, group("Colours", this.colour.label, this.maps.label, range),
         group("Sizes", sizes.label, element("label", {}, element("span", {}, "Scale"), scale), element("label", {}, element("span", {}, "Particle id"), search)),
         group("Clipping plane", this.cutAxis.label, this.cutPlace),
@@ -105,6 +104,38 @@ class Player {
           button("CSV of this frame", "Save the particles of this frame as CSV", () => this.csv())))),
       this.live);
     if (last < 1) this.slider.disabled = true;
+  }
+
+  /** Offers the quantities that change, or differ between particles, as colours and sizes. */
+  offer() {
+    const changing = this.trajectory.quantities().filter((one) => !one.constant);
+    const fill = ({ select }, first, columns) => {
+      const { value } = select;
+      select.replaceChildren(...[["", first], ...columns.map((one) => [one.name, this.label(one)])].map(([name, text]) => element("option", { value: name }, text)));
+      select.value = value;
+    };
+    fill(this.colour, "one colour", changing);
+    fill(this.sizes, "radius", changing.filter((one) => one.name !== "radius"));
+  }
+
+  firstColour() {
+    const colours = this.trajectory.quantities().filter((one) => !one.constant);
+    const first = ["temperature", "speed", "material", "shape", "radius"].map((name) => colours.find((one) => one.name === name)).find(Boolean);
+    this.colourBy((first ?? colours[0])?.name ?? "");
+  }
+
+  /** Shows frames that have been added; scene : of these. The last frame is followed if it was shown. */
+  extend(scene) {
+    const { trajectory, slider, viewer } = this, last = trajectory.frames - 1, following = this.frame === Number(slider.max);
+    slider.max = last;
+    slider.disabled = last < 1;
+    viewer.extend(scene);
+    this.offer();
+    const name = viewer.options.colour;
+    if (!name && !this.chosenColour) this.firstColour();
+    else if (name && !this.chosenRange) this.setRange(...trajectory.columns[name].shown);
+    if (!this.playing) this.go(following ? last : Math.min(this.frame, last));
+    else viewer.invalidate();
   }
 
   label(column) {
@@ -215,6 +246,7 @@ class Player {
     this.rangeBox.hidden = !column;
     this.maps.label.hidden = !column || this.isClass(column);
     this.viewer.set({ colour: column ? name : null });
+    this.chosenRange = false;
     if (column) this.setRange(...column.shown);
     else this.drawLegend();
   }
@@ -234,19 +266,23 @@ class Player {
 
   ranged() {
     const [low, high] = [this.low, this.high].map((input) => Number(input.value.replaceAll("\u2212", "-")));
-    if (Number.isFinite(low) && Number.isFinite(high) && low < high) this.setRange(low, high);
-    else this.setRange(...this.viewer.options.range);
+    if (Number.isFinite(low) && Number.isFinite(high) && low < high) {
+      this.chosenRange = true;
+      this.setRange(low, high);
+    } else this.setRange(...this.viewer.options.range);
   }
 
   rangeOfFrame() {
-    const column = this.trajectory.columns[this.viewer.options.colour], whole = column.frame(this.frame), ids = this.trajectory.columns.id.frame(this.frame);
+    const column = this.trajectory.columns[this.viewer.options.colour].at(this.frame), whole = this.trajectory.columns[column.name].frame(this.frame), ids = this.trajectory.columns.id.frame(this.frame);
     let low = Infinity, high = -Infinity;
     for (let row = 0; row < whole.length; row++) {
       if (!ids[row] || (column.missing && whole[row] === column.largest)) continue;
       low = Math.min(low, whole[row]);
       high = Math.max(high, whole[row]);
     }
-    if (low <= high) this.setRange(column.meaning(low), column.meaning(high));
+    if (low > high) return;
+    this.chosenRange = true;
+    this.setRange(column.meaning(low), column.meaning(high));
   }
 
   applyMap() {

@@ -4,7 +4,8 @@ async function start() {
   const facts = json("facts"), place = document.getElementById("viewer");
   tables();
   try {
-    Object.assign(report, await decodeRun(facts, fromBase64(document.getElementById("recording").textContent)));
+    const run = await decodeRun(facts, fromBase64(document.getElementById("recording").textContent));
+    Object.assign(report, run, facts.live ? { trajectory: new JoinedTrajectory(run, facts.scene) } : {});
     report.player = new Player(place, report.trajectory, facts.scene, report.network, facts);
   } catch (error) {
     place.replaceChildren(element("p", { class: "warning", role: "alert" }, `The particles cannot be shown: ${error.message}`));
@@ -20,8 +21,9 @@ async function start() {
   report.charts = facts.series.curves.map((one) => new Chart(curves, one, facts.series.times, jump, name));
   report.player?.listeners.push((frame) => { for (const chart of report.charts) chart.at(report.trajectory.times[frame]); });
   themes((dark) => report.player?.theme(dark));
-  report.player?.go(0);
+  report.player?.go(facts.live ? report.trajectory.frames - 1 : 0);
   document.documentElement.dataset.ready = "yes";
+  document.dispatchEvent(new Event("ready"));
 }
 
 start();

@@ -55,6 +55,11 @@ class Column {
     this.constant = facts.step.every((step) => step === 0) || (this.exact && facts.shown?.[0] === facts.shown?.[1]);
   }
 
+  /** The column that has a frame; see joined.js. */
+  at() {
+    return this;
+  }
+
   /** The whole numbers of a frame. */
   frame(frame) {
     const length = this.rows * this.parts, k = this.frames > 1 ? frame : 0;
@@ -97,6 +102,11 @@ class Trajectory {
 
   get frames() {
     return this.times.length;
+  }
+
+  /** The part that has a frame, and the index of the frame in it; see joined.js. */
+  at(frame) {
+    return { trajectory: this, frame };
   }
 
   /** The id of the particle in a row; -1 if there is none. */

@@ -231,7 +231,7 @@ uniform mat4 pose;
 out vec3 at;
 flat out vec3 outward;
 void main() {
-  outward = mat3(view) * mat3(pose) * normal;
+  outward = normalize(mat3(view) * mat3(pose) * normal);
   at = (view * pose * vec4(place, 1.0)).xyz;
   gl_Position = projection * vec4(at, 1.0);
 }`;
@@ -323,10 +323,11 @@ class Viewer {
     if (!gl) throw new Error("This browser has no WebGL2, which the view in three dimensions needs.");
     this.gl = gl;
     this.frame = 0;
+    this.part = trajectory.at(0);
     this.chosen = -1;
     this.options = {
       colour: null, range: [0, 1], map: null, size: null, scale: 1, flat: false, walls: true, magnets: "solid",
-      box: true, contacts: false, outlines: true, cut: null, dark: false,
+      box: true, lines: true, contacts: false, outlines: true, cut: null, dark: false,
     };
     const { low, high } = scene.focus;
     this.centre = low.map((x, k) => (x + high[k]) / 2);
@@ -344,9 +345,21 @@ class Viewer {
   }
 
   home() {
-    const zoomedOut = 0.94 / Math.sin(FIELD_OF_VIEW / 2);
-    this.camera = { ...FIRST_VIEW, distance: zoomedOut, target: [0, 0, 0] };
+    const { low, high } = this.scene.focus, size = Math.hypot(...low.map((x, k) => high[k] - x)) / 2 || this.unit;
+    const distance = 0.94 / Math.sin(FIELD_OF_VIEW / 2) * size / this.unit;
+    this.camera = { ...FIRST_VIEW, distance, target: this.relative(low.map((x, k) => (x + high[k]) / 2)) };
     this.invalidate();
+  }
+
+  /** Takes over what a later part of the run has beside its particles; the camera stays. */
+  extend(scene) {
+    const { focus } = this.scene, wider = (name, choose) => scene.focus[name].some((x, k) => choose(x, focus[name][k]) !== focus[name][k]);
+    const grown = wider("low", Math.min) || wider("high", Math.max);
+    focus.low = focus.low.map((x, k) => Math.min(x, scene.focus.low[k]));
+    focus.high = focus.high.map((x, k) => Math.max(x, scene.focus.high[k]));
+    this.reachable = Math.max(this.reachable, ...[scene.low, scene.high].map((r) => 1.4 * Math.hypot(...this.relative(r))));
+    // The planes of walls end around the particles.
+    if (grown) this.bodies = scene.bodies.map((body, k) => ({ ...this.buildBody(body), k }));
   }
 
   // Building
@@ -386,9 +399,10 @@ class Viewer {
     this.particles = this.vertexArray([[0, CORNERS, 2, 0]]);
     this.particles.shapes = this.shapeTable(this.scene.shapes);
     this.buildMagnets();
-    this.bodies = this.scene.bodies.map((body) => this.buildBody(body));
-    this.boxLines = this.lines(this.boxEdges(0));
+    this.bodies = this.scene.bodies.map((body, k) => ({ ...this.buildBody(body), k }));
+    this.boxLines = this.lines(this.boxEdges());
     this.contactLines = this.lines([]);
+    this.fieldLines = this.lines((this.scene.lines?.ends ?? []).map((x, k) => (x - this.centre[k % 3]) / this.unit));
     this.image = null;
     if (this.options.map) this.setMap(this.options.map, this.options.discrete);
   }
@@ -464,7 +478,7 @@ class Viewer {
     const own = this.vertexArray([[0, new Float32Array(places), 3, 0], [1, new Float32Array(normals), 3, 0]]);
     const ends = [];
     for (const k of body.lines) ends.push(...corner(k));
-    return { ...own, count: places.length / 3, lines: this.lines(ends), poses: body.poses };
+    return { ...own, count: places.length / 3, lines: this.lines(ends) };
   }
 
   /** ends : three coordinates of both ends of each line, relative. */
@@ -482,15 +496,20 @@ class Viewer {
     return own;
   }
 
-  edges(frame) {
-    const { edges } = this.scene.box;
-    return edges[Math.min(frame, edges.length - 1)];
+  /** The scene of the part that is shown. */
+  around() {
+    return this.part.scene ?? this.scene;
   }
 
-  boxEdges(frame) {
+  edges() {
+    const { edges } = this.around().box;
+    return edges[Math.min(this.part.frame, edges.length - 1)];
+  }
+
+  boxEdges() {
     const { box } = this.scene, ends = [];
     if (!box) return ends;
-    const edges = this.edges(frame);
+    const edges = this.edges();
     const corner = (k) => this.relative(box.origin.map((x, m) => x + [0, 1, 2].reduce(
       (sum, axis) => sum + (k >> axis & 1) * edges[axis][m], 0)));
     for (let a = 0; a < 8; a++) for (let axis = 0; axis < 3; axis++) {
@@ -504,31 +523,34 @@ class Viewer {
   /** Shows a frame. */
   show(frame) {
     this.frame = frame;
-    const { trajectory, options, particles, particles: { buffers } } = this;
+    const before = this.part.trajectory;
+    this.part = this.trajectory.at(frame);
+    const { options, particles, particles: { buffers }, part: { trajectory, frame: own } } = this, other = trajectory !== before;
     const { position, id, orientation, shape } = trajectory.columns;
-    this.attribute(particles, 1, position.frame(frame), 3);
-    if (id.frames > 1 || !buffers[6]) {
-      this.attribute(particles, 6, Uint8Array.from(id.frame(frame), (one) => (one > 0 ? 1 : 0)), 1);
+    this.attribute(particles, 1, position.frame(own), 3);
+    if (id.frames > 1 || !buffers[6] || other) {
+      this.attribute(particles, 6, Uint8Array.from(id.frame(own), (one) => (one > 0 ? 1 : 0)), 1);
     }
-    if (orientation && (orientation.frames > 1 || !buffers[4])) this.attribute(particles, 4, orientation.frame(frame), 4);
-    if (shape && (shape.frames > 1 || !buffers[5])) {
-      this.attribute(particles, 5, Uint8Array.from(shape.frame(frame), (one) => one + shape.origin[0]), 1);
+    if (orientation && (orientation.frames > 1 || !buffers[4] || other)) this.attribute(particles, 4, orientation.frame(own), 4);
+    if (shape && (shape.frames > 1 || !buffers[5] || other)) {
+      this.attribute(particles, 5, Uint8Array.from(shape.frame(own), (one) => one + shape.origin[0]), 1);
     }
     const size = trajectory.columns[options.size] ?? trajectory.columns.radius;
-    this.attribute(particles, 2, size.frame(frame), 1);
+    this.attribute(particles, 2, size.frame(own), 1);
     const colour = trajectory.columns[options.colour];
-    if (colour) this.attribute(particles, 3, colour.frame(frame), 1);
-    if (this.scene.box && this.scene.box.edges.length > 1) this.lines(this.boxEdges(frame), null, this.boxLines);
+    if (colour) this.attribute(particles, 3, colour.frame(own), 1);
+    if (this.scene.box && (this.around().box.edges.length > 1 || other)) this.lines(this.boxEdges(), null, this.boxLines);
     this.findContacts();
     this.invalidate();
   }
 
   findContacts() {
-    if (!this.network || !this.options.contacts) return;
+    const network = this.part.network ?? this.network;
+    if (!network || !this.options.contacts) return this.lines([], null, this.contactLines);
     const ends = [], weights = [], box = this.scene.box;
-    const rows = box ? this.edges(this.frame).map((edge, k) => (box.periodic[k] ? edge : null)) : [null, null, null];
+    const rows = box ? this.edges().map((edge, k) => (box.periodic[k] ? edge : null)) : [null, null, null];
     const order = [0, 1, 2].sort((a, b) => (rows[b] ?? []).filter(Boolean).length - (rows[a] ?? []).filter(Boolean).length);
-    this.network.each(this.frame, (i, j, depth) => {
+    network.each(this.part.frame, (i, j, depth) => {
       const a = this.trajectory.position(this.frame, i), b = this.trajectory.position(this.frame, j);
       for (const axis of order) {
         if (!rows[axis]) continue;
@@ -536,7 +558,7 @@ class Viewer {
         for (let m = 0; m < 3; m++) b[m] -= turns * rows[axis][m];
       }
       ends.push(...this.relative(a), ...this.relative(b));
-      weights.push(Math.min(1, depth / this.network.usual) ** 1.5);   // as Hertz's force
+      weights.push(Math.min(1, depth / network.usual) ** 1.5);   // as Hertz's force
     });
     this.lines(ends, new Float32Array(weights), this.contactLines);
   }
@@ -693,14 +715,14 @@ class Viewer {
   }
 
   drawParticles(lens, samples) {
-    const { gl, options, trajectory } = this, places = this.use("particles", lens);
+    const { gl, options, part: { trajectory } } = this, places = this.use("particles", lens);
     const { position, radius, orientation } = trajectory.columns, colour = trajectory.columns[options.colour];
     const factor = options.scale * (options.contacts && this.network ? 0.35 : 1);
     gl.uniform3fv(places.origin, this.relative(position.origin));
     gl.uniform3fv(places.step_, position.step.map((step) => step / this.unit));
     const other = options.size && options.size !== "radius" ? trajectory.columns[options.size] : null;
     if (other) {
-      const largest = this.scene.medianRadius / this.unit * factor * 1.6, [low, high] = other.shown.map((x) => other.place(x));
+      const largest = this.scene.medianRadius / this.unit * factor * 1.6, [low, high] = this.trajectory.columns[options.size].shown.map((x) => other.place(x));
       const slope = 0.9 * largest / (high - low || 1);
       gl.uniform2f(places.sizes, 0.1 * largest - slope * low, slope);
     } else if (radius.logarithmic) {
@@ -756,8 +778,12 @@ class Viewer {
   }
 
   pose(body) {
-    if (!body?.poses?.length) return Matrix.pose([0, 0, 0, 0, 0, 0, 1]);
-    const [a, b, c, ...q] = body.poses.slice(7 * this.frame, 7 * this.frame + 7), turn = Matrix.pose([0, 0, 0, ...q]);
+    const around = body ? this.around().bodies[body.k] : null, own = this.part.frame;
+    if (!around?.poses?.length) return Matrix.pose([0, 0, 0, 0, 0, 0, 1]);
+    const [a, b, c, ...q] = around.poses.slice(7 * own, 7 * own + 7), turn = Matrix.pose([0, 0, 0, ...q]);
+    (around.stretches ?? []).slice(3 * own, 3 * own + 3).forEach((longer, k) => {
+      for (let m = 0; m < 3; m++) turn[4 * k + m] *= longer;
+    });
     // From relative coordinates to relative coordinates: R (centre + unit x) + shift.
     const moved = [0, 1, 2].map((m) => turn[m] * this.centre[0] + turn[4 + m] * this.centre[1] + turn[8 + m] * this.centre[2]);
     [a, b, c].forEach((x, m) => { turn[12 + m] = (moved[m] + x - this.centre[m]) / this.unit; });
@@ -777,6 +803,7 @@ class Viewer {
     gl.uniform2f(places.screen, this.canvas.width * samples, this.canvas.height * samples);
     if (options.box) draw(this.boxLines, null, [ink, ink, ink, 1], [0.9, 0]);
     if (options.walls) for (const body of this.bodies) draw(body.lines, body, [ink, ink * 1.02, ink * 1.06, 1], [1.1, 0]);
+    if (options.lines && this.scene.lines) draw(this.fieldLines, null, [...this.scene.lines.colour.map((x) => x / 255 + (options.dark ? 0.2 : 0)), 1], [1.4, 0]);
     if (options.contacts && this.network) draw(this.contactLines, null, options.dark ? [0.98, 0.72, 0.3, 1] : [0.72, 0.2, 0.1, 1], [0.4, 6]);
   }
 
