@@ -191,7 +191,7 @@ def verdict(problem: Problem, result: MethodResult) -> str:
     return ANSWERS[feasible(problem.result_constraints, result.limits)]
 
 
-def table(problem: Problem, results: Sequence[MethodResult] | Sequence[FrontResult]) -> Table:
+def table(problem: Problem, results: Sequence[MethodResult | FrontResult]) -> Table:
     """Return a table with a line for each method, the best median first: of the best designs for one
     objective, or of the hypervolumes of the fronts (``front_comparison``)."""
     fronts = [one for one in results if isinstance(one, FrontResult)]
@@ -241,7 +241,7 @@ def _median(values: Sequence[float]) -> float:
     return float(np.median(values)) if values else math.nan
 
 
-def as_csv(problem: Problem, results: Sequence[MethodResult] | Sequence[FrontResult]) -> bytes:
+def as_csv(problem: Problem, results: Sequence[MethodResult | FrontResult]) -> bytes:
     """Return a CSV file with a line for each search, or for each design of each front, and all digits."""
     fronts = [one for one in results if isinstance(one, FrontResult)]
     if fronts:

@@ -42,7 +42,7 @@ VIOLATIONS_NOTE = "violated: designs whose mean violates a constraint, which do 
 Points = NDArray[np.float64]
 
 
-class _Costs(base.Fitness):  # type: ignore[misc]
+class _Costs(base.Fitness):
     """Costs as DEAP's hypervolume reads them."""
 
     def __init__(self, costs: Points) -> None:
