@@ -16,13 +16,13 @@ from string import Template
 
 import recordings
 
-from tisim.report.page import static
+from tisim.report.page import PARTICLE_SCRIPTS, static
 from tisim.report.scenery import colour_maps
 
 GALLERY = "gallery"
 """Name of the page with the questions and findings."""
 SECTION = re.compile(r"^## (?P<question>.+?)\n(?P<text>.*?)(?=^## |\Z)", re.M | re.S)
-SCRIPTS = ("parts.js", "chart.js", "trajectory.js", "viewer.js", "player.js")
+SCRIPTS = ("parts.js", "chart.js", *PARTICLE_SCRIPTS)
 """The scripts of a report that its viewer needs."""
 FIGURE = """<figure class="recording" data-recording="$name">
 <div class="screen"><img src="$picture" width="$across" height="$upwards" alt="$alt" loading="lazy">
@@ -39,9 +39,7 @@ const STYLE = $style, MAPS = $maps;
 async function show(host, facts, data) {
   const bytes = fromBase64(data), place = element("section", { id: "viewer", "aria-label": "Particles" });
   host.attachShadow({ mode: "open" }).append(element("style", {}, STYLE), place);
-  let begin = 0;
-  const parts = facts.lengths.map((length) => bytes.subarray(begin, begin += length));
-  const trajectory = await Trajectory.decode(facts.trajectory, parts);
+  const { trajectory } = await decodeRun(facts, bytes);
   const player = new Player(place, trajectory, facts.scene, null, { ...facts, maps: MAPS });
   player.colourBy(facts.colour);
   place.querySelector("details").open = false;

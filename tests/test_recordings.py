@@ -161,3 +161,4 @@ def test_the_script_of_the_viewer_is_for_a_shadow_root_and_has_one_name():
     assert ':host([data-theme=\\"dark\\"])' in script
     assert re.findall(r"^window\.\w+", script, re.M) == ["window.tisimViewer"]
     assert all(f"class {name} " in script for name in ("Trajectory", "Viewer", "Player"))
+    assert all(f"function {name}(" in script for name in ("element", "quantity", "axisUnit", "decodeRun"))
