@@ -55,6 +55,7 @@ INNER = "|".join(
         r"tisim\.(materials\.materials|components\.component|steppers\.context|state\.(bound|state)|program\.phases|pairs\.(lists|half_list)|engine\.assembly|forces\.force_sum|effects\.contact\.granular\.parts)\.\w+",
         r"tisim\.(effects\.base\.effect\.SceneParts|sources\.magnetic\.mutual_magnetisation\.Magnetised)",
         r"tisim\.sources\.pore_flow\.(solids|pore_flow)\.\w+",
+        r"tisim\.(notebook\.ViewerCell|io\.reader\.RecordedWorld)",
         r"(tisim\.)?optimize\.(report\.search_page|methods\.\w+|problem\.(function|constraint|statistic)|storage\.cache|analysis\.\w+)\.\w+",
     )
 )
