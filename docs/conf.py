@@ -6,6 +6,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 import equation_nodes
 import pair_plots
+import recorded_nodes
 import reference_pages
 
 from tisim.version import __version__
@@ -16,7 +17,7 @@ exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = f"tisim {release}"
 html_static_path = ["_static"]
-html_css_files = ["equations.css", "coverage.css"]
+html_css_files = ["equations.css", "coverage.css", "recordings.css"]
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 HIDDEN = (
@@ -69,8 +70,8 @@ def write_pages(app):
 
 
 def setup(app):
-    """Write the pages that come from the code, read its docstrings as the plain text that they are, and set
-    equations."""
+    """Write the pages that come from the code, read its docstrings as the plain text that they are, set
+    equations, and let recordings play."""
     app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-docstring", reference_pages.as_rst)
     app.connect("autodoc-process-signature", reference_pages.signature)
@@ -78,3 +79,4 @@ def setup(app):
     app.connect("doctree-read", equation_nodes.set_formulas)
     for node in (equation_nodes.Equations, equation_nodes.Formula):
         app.add_node(node, html=(equation_nodes.visit, None))
+    recorded_nodes.setup(app)

@@ -94,7 +94,7 @@ def draw(axis: Axes, result: tisim.Result, look: Look) -> None:
     scene, state = result.scene, result.state
     colours = colouring(scene, [state])
     both = [result.start, state]
-    around = scenery(scene, both, result.time, result.measures)
+    around = scenery(scene, both, result.time, result.measures, state)
     part = window(both, [around], look)
     panel(axis, state, part, around, None if colours is None else colours.of(state), shapes_of(scene), look)
     directions(axis, part, gravity(scene), camera=look.camera)

@@ -13,7 +13,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.axes import Axes
 from scipy.spatial.transform import Rotation as Turn
 
 import tisim
@@ -28,6 +28,10 @@ from tisim.effects import (
     Walls,
 )
 from tisim.geometry import Plane
+from tisim.plotting.cloud import directions, gravity, panel
+from tisim.plotting.look import Look
+from tisim.plotting.scenery import scenery
+from tisim.rendering.camera import Window
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
 from tisim.steppers import FixedStep, Verlet
 
@@ -41,6 +45,9 @@ BRICK = SuperquadricShape(semi_axes=(1.2 * D, 0.6 * D, 0.8 * D), exponents=(8.0,
 EGG = SuperquadricShape(semi_axes=(0.7 * D, 0.7 * D, 1.2 * D), exponents=(2.0, 2.0, 2.0))
 ALONG_Y = Turn.from_rotvec([np.pi / 2, 0, 0]).as_quat(scalar_first=True)
 STEP = 1e-5
+LOOK = Look.of(view="-75,12")
+HOPPER, BOX = Window(-0.021, -0.028, 0.042, 0.068), Window(-0.016, -0.004, 0.032, 0.028)
+"""Parts of the pictures that are shown."""
 LAWS = (
     Granular(normal=HertzMaterial(), damping=RestitutionDamping(), tangential=MindlinForce()),
     Gravity(acceleration=(0.0, 0.0, -9.81)),
@@ -125,27 +132,11 @@ def box(layers: int = 9, duration: float = 0.5) -> tisim.Scene:
     )
 
 
-def outlines(state: dict[str, np.ndarray], shapes: tuple[Any, ...]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Return the outlines of bodies seen along y (mm), the farthest first, and their indices."""
-    angle = np.linspace(0, 2 * np.pi, 60)
-    around = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=-1)
-    order, found = np.argsort(-state["position"][:, 1]), []
-    for i in order:
-        turn = Turn.from_quat(state["orientation"][i], scalar_first=True)
-        points = turn.apply(shapes[int(state["shape"][i])].support(turn.inv().apply(around)))
-        found.append(1e3 * (state["position"][i] + points)[:, [0, 2]])
-    return found, order
-
-
-def draw(axes: Any, state: dict[str, np.ndarray], shapes: tuple[Any, ...], colour: np.ndarray) -> None:
-    """Draw bodies seen along y, with a colour each; nearer ones are lighter."""
-    found, order = outlines(state, shapes)
-    near = np.argsort(np.argsort(-state["position"][order, 1])) / len(order)
-    faces = colour[order] * (0.6 + 0.4 * near[:, None])
-    axes.add_collection(
-        PolyCollection(found, facecolors=np.clip(faces, 0, 1), edgecolors="k", linewidths=0.3)
-    )
-    axes.set_aspect("equal")
+def draw(axes: Axes, result: tisim.Result, shapes: tuple[Any, ...], colour: np.ndarray, part: Window) -> None:
+    """Draw bodies and the walls around them, with a colour each."""
+    around = scenery(result.scene, [result.state], result.time)
+    panel(axes, result.state, part, around, colour, shapes, LOOK)
+    directions(axes, part, gravity(result.scene), camera=LOOK.camera)
 
 
 def main(folder: Path) -> None:
@@ -164,26 +155,21 @@ def main(folder: Path) -> None:
         state, bar = result.state, result.state["shape"] == 1
         speed = np.clip(np.linalg.norm(state["velocity"], axis=1) / 0.5, 0, 1)
         colour = np.where(bar[:, None], 0.55, pyplot.get_cmap("viridis")(speed)[:, :3])
-        draw(axes, state, (ROD, BAR), colour)
+        draw(axes, result, (ROD, BAR), colour, HOPPER)
         below = int((state["position"][~bar, 2] < 0).sum())
-        axes.set(xlim=(-20, 20), ylim=(-25, 40), title=f"{time:g} s: {below} of {(~bar).sum()} out")
-        edges = 1e3 * np.array([[(s * HALF, 0.016), (s * HALF, 1)] for s in (-1, 1)])
-        axes.add_collection(LineCollection(list(edges), colors="grey"))
+        axes.set_title(f"{time:g} s: {below} of {(~bar).sum()} out")
         print(f"{time:g} s: {result.status.reason}; {below} rods out", flush=True)
     result = tisim.run(box())
     state = result.state
     tints = np.array([(0.85, 0.45, 0.3), (0.35, 0.55, 0.8)])[state["shape"].astype(int)]
-    draw(panels[3], state, (BRICK, EGG), tints)
-    panels[3].set(xlim=(-12.5, 12.5), ylim=(-0.5, 16), title="bricks and ellipsoids at rest")
+    draw(panels[3], result, (BRICK, EGG), tints, BOX)
+    panels[3].set_title("bricks and ellipsoids at rest")
     energy = 0.5 * (state["mass"] * (state["velocity"] ** 2).sum(axis=1)).sum()
     energy += 0.5 * (state["angular_momentum"] * state["spin"]).sum()
     fall = (state["mass"] * 9.81 * D).sum()
     print(f"box: {result.status.reason}; kinetic energy over that of a fall by D {energy / fall:.1e}")
     weight = 9.81 * state["mass"].sum()
     print(f"floor carries {-result.measures['walls_force_z'] / weight:.3f} of the weight")
-    for axes in panels:
-        axes.set_xlabel("x (mm)")
-    panels[0].set_ylabel("z (mm)")
     figure.savefig(folder / "shapes.png", dpi=110)
 
 

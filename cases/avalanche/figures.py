@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection, QuadMesh
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from tisim import Scene
@@ -21,7 +22,11 @@ from tisim.effects import Translation, Walls
 from tisim.engine.batches import Progress
 from tisim.errors import must
 from tisim.io.reader import Frames
+from tisim.plotting.cloud import panel
+from tisim.plotting.look import FROM_THE_SIDE
+from tisim.plotting.scenery import window
 from tisim.plotting.style import empty, letters, plain
+from tisim.rendering.camera import Window
 from tisim.scene.initial_state import Arrays
 
 SEEDS = 3
@@ -171,17 +176,12 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     begin, unit = opening(scene), time_unit(d)
     chosen = [trajectory[int(np.abs(times - begin - after * unit).argmin())] for after in AFTER]
     strips = strips_of(chosen[0].arrays, d)
-    figure = empty(11.6, 5.4)
-    axes = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
-    furthest = max(float(frame.arrays["position"][:, 0].max()) for frame in chosen) / d
+    figure = empty(11.6, 5.4, pad=0.1)
+    axes = figure.subplots(2, 3).ravel()
+    part = window([frame.arrays for frame in chosen], look=FROM_THE_SIDE, ratio=1.4)
     for axis, frame in zip(axes, chosen, strict=True):
-        side_view(axis, frame.arrays, strips)
-        axis.set(xlim=(0.0, furthest + 1.0), aspect="equal")
+        side_view(axis, frame.arrays, strips, part)
         axis.set_title(f"after {max(frame.time - begin, 0.0):.2g} s")
-    for axis in axes[3:]:
-        axis.set_xlabel("distance (diameters)")
-    for axis in axes[::3]:
-        axis.set_ylabel("height (diameters)")
     letters(axes)
     return {"calving.png": figure}
 
@@ -192,14 +192,8 @@ def strips_of(state: Arrays, d: float) -> dict[int, int]:
     return dict(zip(state["id"].tolist(), strip.tolist(), strict=True))
 
 
-def side_view(axis: Axes, state: Arrays, strips: Mapping[int, int]) -> None:
-    """Draw the grains as seen along the width of the cell, in the colours of their strips."""
-    order = np.argsort(-state["position"][:, 1])
-    place, size = (state[name][order] / diameter(state) for name in ("position", "radius"))
-    colours = [STRIP_COLOURS[strips[k] % len(STRIP_COLOURS)] for k in state["id"][order].tolist()]
-    grains = EllipseCollection(
-        2 * size, 2 * size, np.zeros(len(size)), units="xy", offsets=place[:, [0, 2]],
-        offset_transform=axis.transData, facecolors=colours, edgecolors="white", linewidths=0.3,
-    )  # fmt: skip
-    axis.add_collection(grains)
-    axis.set_ylim(0.0, float(place[:, 2].max()) + 1.0)
+def side_view(axis: Axes, state: Arrays, strips: Mapping[int, int], part: Window) -> None:
+    """Draw the grains on the floor as seen along the width of the cell, in the colours of their strips."""
+    colours = [to_rgb(STRIP_COLOURS[strips[k] % len(STRIP_COLOURS)]) for k in state["id"].tolist()]
+    panel(axis, state, part, colour=np.array(colours), look=FROM_THE_SIDE)
+    axis.axhline(0.0, color="0.4", lw=1.0, zorder=1)

@@ -6,20 +6,21 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from tisim import Recording, run
 from tisim.analysis import head_to_tail, labels
 from tisim.cases.common.csv_tables import csv_text
-from tisim.cases.common.magnetic_fibre import MICRO
 from tisim.cases.concentration import scene as concentration
 from tisim.cases.concentration.scene import coupling
 from tisim.cases.concentration.statistics import CAPTURE, chain, held_fraction
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames, frames
+from tisim.plotting.cloud import directions, panel
+from tisim.plotting.clusters import cluster_colours
+from tisim.plotting.look import FROM_THE_SIDE
+from tisim.plotting.scenery import window
 from tisim.plotting.style import empty, letters, plain
 from tisim.scene.initial_state import Arrays
 
@@ -47,29 +48,19 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     right.plot(times, [chain(frame.arrays, moment) for frame in every], color="#4477aa")
     right.set(xlabel="time (ms)", ylabel="mean number of particles of a chain", ylim=(0, None))
     plain(right)
-    left.set_title(f"after {times[-1]:.3g} ms, coloured by chain; white: single")
+    left.set_title(f"after {times[-1]:.3g} ms, coloured by chain; grey: single")
     letters((left, right))
     return {"chains.png": figure}
 
 
 def snapshot(axis: Axes, state: Arrays) -> None:
-    """Draw the particles as seen along y, to scale; single particles are white, the others coloured by
+    """Draw the particles as seen along y, across the field; single particles are grey, the others coloured by
     chain."""
     position, moment, radius = state["position"], state["moment"], float(state["radius"][0])
     chains = labels(len(position), head_to_tail(position, moment, 2 * radius))
-    single = np.bincount(chains)[chains] == 1
-    places = (position - position.mean(axis=0))[:, [0, 2]] / MICRO
-    order = np.argsort(-position[:, 1])
-    size = np.full(len(position), 2 * radius / MICRO)
-    discs = EllipseCollection(size, size, np.zeros(len(position)), units="x", offsets=places[order],
-                              offset_transform=axis.transData, edgecolor="0.3", lw=0.4)  # fmt: skip
-    colour = np.ma.masked_array(chains * 7 % 20, single)[order]
-    discs.set(cmap=colormaps["tab20"].with_extremes(bad="white"), clim=(0, 19), array=colour)
-    axis.add_collection(discs)
-    axis.autoscale_view()
-    reach = np.abs(places).max() + 2 * radius / MICRO
-    axis.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    axis.set(xlabel="x, along the field (µm)", ylabel="z (µm)")
+    part = window([state], look=FROM_THE_SIDE)
+    panel(axis, state, part, colour=cluster_colours(chains), look=FROM_THE_SIDE)
+    directions(axis, part, np.zeros(3), camera=FROM_THE_SIDE.camera)
 
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:

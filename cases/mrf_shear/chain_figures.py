@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from tisim.analysis import Mean, nearest_image, periodic_sides
@@ -16,7 +15,10 @@ from tisim.cases.mrf_shear.measures import extent
 from tisim.cases.mrf_shear.morphology import widths
 from tisim.cases.mrf_shear.scene import LARGE_RADIUS, STRAIN
 from tisim.numerics.statistics import half_width
+from tisim.plotting.cloud import directions, panel
+from tisim.plotting.look import FROM_THE_SIDE
 from tisim.plotting.style import empty, letters, plain
+from tisim.rendering.camera import Window
 from tisim.scene.initial_state import Arrays
 
 CHAIN, JOINED, OTHERS = "#cc3311", "#228833", "0.82"
@@ -75,7 +77,6 @@ def reattachment_figure(cells: Sequence[Followed], still: Sequence[Followed]) ->
     for axis, frame in zip(axes[:3], SHOWN, strict=True):
         draw_chain(axis, cells[0], frame)
         axis.set_title(f"strain {STRAIN * cells[0].part[frame]:g}")
-    axes[0].set_ylabel("z (µm)")
     draw_numbers(axes[3], cells, still)
     letters(axes)
     return figure
@@ -95,22 +96,18 @@ def draw_chain(axis: Axes, cell: Followed, frame: int) -> None:
     joined = np.setdiff1d(links[np.isin(links, chain).any(axis=1)], chain)
     beside = np.flatnonzero(np.abs(from_middle[:, 1]) < 2 * LARGE_RADIUS)
     others = np.setdiff1d(beside, np.concatenate([chain, joined]))
-    for grains, colour, order in ((others, OTHERS, 1), (joined, JOINED, 2), (chain, CHAIN, 3)):
-        discs = [
-            Circle((MICRONS * from_middle[k, 0], MICRONS * position[k, 2]), MICRONS * radius[k])
-            for k in grains
-        ]
-        axis.add_collection(PatchCollection(discs, facecolor=colour, edgecolor="white", lw=0.6, zorder=order))
+    place = np.column_stack([from_middle[:, :2], position[:, 2]])
+    part = Window(-sides[0, 0] / 2, 0.0, float(sides[0, 0]), float(height))
+    # The chain is in front of the others, so that it can be seen.
+    for grains, colour in ((others, OTHERS), (joined, JOINED), (chain, CHAIN)):
+        state = {"position": place[grains], "radius": radius[grains]}
+        panel(axis, state, part, colour=np.tile(to_rgb(colour), (len(grains), 1)), look=FROM_THE_SIDE)
+    directions(axis, part, np.zeros(3), camera=FROM_THE_SIDE.camera)
     pairs, shown = cell.pairs(frame), np.concatenate([chain, joined])
     # The contacts of the chain.
     for i, j in pairs[np.isin(pairs, chain).any(axis=1) & np.isin(pairs, shown).all(axis=1)]:
-        apart = nearest_image(position[[j]] - position[[i]], sides)[0]
-        ends = np.array([from_middle[i], from_middle[i] + apart]) * MICRONS
-        axis.plot(
-            ends[:, 0], MICRONS * position[i, 2] + ends[:, 2] - ends[0, 2], color="0.1", lw=1.2, zorder=4
-        )
-    half = MICRONS * sides[0, 0] / 2
-    axis.set(xlim=(-half, half), ylim=(0, MICRONS * height), aspect="equal", xlabel="x (µm)")
+        ends = place[i] + np.array([np.zeros(3), nearest_image(position[[j]] - position[[i]], sides)[0]])
+        axis.plot(ends[:, 0], ends[:, 2], color="0.1", lw=1.2, zorder=4)
 
 
 def draw_numbers(axis: Axes, cells: Sequence[Followed], still: Sequence[Followed]) -> None:

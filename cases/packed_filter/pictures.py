@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from tisim import Result, Scene
 from tisim.cases.packed_filter.measures import matrix_box
 from tisim.io.reader import Frames
+from tisim.plotting.field_lines import follow
 from tisim.plotting.image import draw_solids
 from tisim.plotting.style import TIME, empty, letters, plain
 from tisim.rendering.solids import DrawnCylinders, DrawnRods, DrawnSpheres
@@ -96,19 +97,11 @@ def streamlines(scene: Scene, unit: float) -> np.ndarray:
     x, y = np.meshgrid(low[0] + side * (high - low)[0], low[1] + side * (high - low)[1])
     place = np.stack([x.ravel(), y.ravel(), np.full(x.size, low[2] - 2 * unit)], axis=1)
     step = LINE_STEP * unit
+    count = int((high[2] - low[2] + 4 * unit) / step * 1.3)
     with FieldSampler(scene.effects, FLOW) as flow:
         # Nothing flows outside a tube.
-        points = [place[flow(place)[0].any(axis=1)]]
-        for _ in range(int((high[2] - low[2] + 4 * unit) / step * 1.3)):
-            # The midpoint rule, with steps of equal length.
-            half = points[-1] + 0.5 * step * _direction(flow, points[-1])
-            points.append(points[-1] + step * _direction(flow, half))
-    return np.array(points)
-
-
-def _direction(flow: FieldSampler, place: np.ndarray) -> np.ndarray:
-    velocity, _ = flow(place)
-    return np.asarray(velocity / np.maximum(np.linalg.norm(velocity, axis=1), 1e-300)[:, None])
+        some = place[flow(place)[0].any(axis=1)]
+        return follow(lambda points: flow(points)[0], some, step, count)
 
 
 def course(axis: Axes, states: list[Mapping[str, np.ndarray]], times: np.ndarray) -> None:

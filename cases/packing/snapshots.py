@@ -12,9 +12,12 @@ from matplotlib.figure import Figure
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.wall_alignment import direction_histogram
 from tisim.cases.packing.measures import contact_counts
-from tisim.cases.packing.studies import PackedRow, shortest
+from tisim.cases.packing.studies import PackedRow, container_of, shortest
+from tisim.geometry.container import Container
+from tisim.geometry.tessellation import sharp_edges
 from tisim.plotting.bodies import draw_bodies
 from tisim.plotting.packings import directions
+from tisim.plotting.scenery import NO_SCENERY, wall_scenery
 from tisim.plotting.style import empty
 
 MOST_CONTACTS = 12
@@ -34,11 +37,24 @@ def contact_colours(contacts: np.ndarray) -> np.ndarray:
     return np.asarray(colormaps["viridis"](np.clip(contacts / MOST_CONTACTS, 0, 1))[:, :3])
 
 
-def draw_by_contacts(axis: Axes, packing: PackedBodies, kept: np.ndarray | None = None) -> None:
-    """Draw a packing, or some of its bodies, each coloured by its number of contacts."""
+def draw_by_contacts(
+    axis: Axes,
+    packing: PackedBodies,
+    kept: np.ndarray | None = None,
+    container: Container | None = None,
+    length: float = np.inf,
+) -> None:
+    """Draw a packing, or some of its bodies, each coloured by its number of contacts, in its container.
+
+    length : of the drawn part of the container along z, m.
+    """
     colours = contact_colours(contact_counts(packing))
-    some = np.ones(len(packing), bool) if kept is None else kept
-    draw_bodies(axis, packing.where(some), colours[some])
+    some, around = np.ones(len(packing), bool) if kept is None else kept, NO_SCENERY
+    if container is not None:
+        side = np.minimum(packing.high - packing.low, [np.inf, np.inf, length])
+        triangles = packing.low + container.triangles(side, float(packing.diameters()[0]))
+        around = wall_scenery(triangles, sharp_edges(triangles))
+    draw_bodies(axis, packing.where(some), colours[some], around=around)
 
 
 def contact_scale(figure: Figure, axes: Sequence[Axes]) -> None:
@@ -58,8 +74,9 @@ def snapshots(
         axis.set_axis_off()
     for axis, (row, bodies) in zip(axes, packings, strict=False):
         unit = float(bodies.diameters()[0])
-        kept = bodies.position[:, 2] - bodies.low[2] < SEGMENT * unit if row.study == "cylinder" else None
-        draw_by_contacts(axis, bodies, kept)
+        length = SEGMENT * unit if row.study == "cylinder" else np.inf
+        kept = bodies.position[:, 2] - bodies.low[2] < length
+        draw_by_contacts(axis, bodies, kept, container_of(row), length)
         axis.set_title(f"{title(row)}\n$\\phi$ = {row.fraction:.3f}, $C$ = {row.touching:.2f}", fontsize=9)
     contact_scale(figure, list(axes))
     return figure

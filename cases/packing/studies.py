@@ -82,11 +82,7 @@ class PackedPlan:
 
     def container(self) -> containers.Container | None:
         """Return the container; None for a periodic box."""
-        if self.study == "cylinder":
-            return CylindricalContainer(diameter=self.width)
-        if self.study == "wedge":
-            return WedgeContainer(length=self.width, angle=np.radians(self.angle))
-        return None
+        return container_of(self)
 
     def options(self, size: str, **settings: Any) -> dict[str, Any]:
         """Return the arguments of ``of_shape``. settings : arguments of ``scene``; they override the size."""
@@ -152,6 +148,15 @@ class PackedRow:
         # NaN has no place.
         numbers = np.nan_to_num([self.shape, self.angle, self.width, self.inertia, self.limit, self.seed])
         return (self.method, *numbers.tolist())
+
+
+def container_of(one: PackedPlan | PackedRow) -> containers.Container | None:
+    """Return the container of a packing; None for a periodic box."""
+    if one.study == "cylinder":
+        return CylindricalContainer(diameter=one.width)
+    if one.study == "wedge":
+        return WedgeContainer(length=one.width, angle=np.radians(one.angle))
+    return None
 
 
 IDENTITY = tuple(one.name for one in fields(PackedRow)[:12])

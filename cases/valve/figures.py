@@ -2,27 +2,35 @@
 grains."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import EllipseCollection
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from tisim.cases.common.csv_tables import csv_text
-from tisim.cases.valve.measures import clusters, drag_pressure, duct_of, held_pressure, oil_of
+from tisim.cases.valve.measures import clusters, drag_pressure, held_pressure, oil_of
 from tisim.cases.valve.runs import ARRESTED, Flow, ValveRuns, by_field, by_throat, left
 from tisim.cases.valve.scene import THROATS, D
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.errors import must
-from tisim.plotting.style import empty, letters, plain
+from tisim.plotting.cloud import directions, panel
+from tisim.plotting.look import Look
+from tisim.plotting.scenery import scenery, window
+from tisim.plotting.style import TIME, empty, letters, plain
+from tisim.rendering.camera import ALONG_Y, ClipPlane
 
 STARTS = 6
 """Number of starts of each setting. The narrow valve in the strongest field and without one has twice this
 number, and the one with fine grains has half of it."""
 COLOURS = ("#4477aa", "#cc6677", "#228833", "#aaaaaa")
 """Colours of the narrow and of the wide constriction, of fine grains, and of runs without a field."""
-FASTEST = 0.6
-"""Upper end of the colour scale of speed, as a fraction of the speed of the oil in the duct."""
+SPEEDS = Normalize(0.0, 0.6)
+"""Scale of the colours: speed as a fraction of the speed of the oil in the duct."""
+CUT = Look(camera=ALONG_Y, clip=(ClipPlane((0.0, -1.0, 0.0), 0.0),))
+"""The look of grains that are cut in the plane of axis and field."""
 MILLI = 1e-3
 """A millisecond, s, and a millimetre, m."""
 
@@ -69,42 +77,27 @@ def flow_figure(throats: Sequence[ValveRuns], fields: Sequence[ValveRuns]) -> Fi
 
 
 def cut_figure(valves: Sequence[ValveRuns]) -> Figure:
-    """Draw the grains in the plane of axis and field at the end, by speed, for the first start of each
+    """Draw the grains behind the plane of axis and field at the end, by speed, for the first start of each
     valve."""
-    figure = empty(3.3 * len(valves) + 0.8, 3.4, pad=0.1)
-    axes = figure.subplots(1, len(valves), sharey=True)
+    figure = empty(3.3 * len(valves) + 0.8, 3.8, pad=0.1)
+    axes = figure.subplots(1, len(valves))
     for axis, valve in zip(axes, valves, strict=True):
-        circles = cut(axis, valve.flows[0])
+        cut(axis, valve.flows[0])
         axis.set_title(f"{valve.name}: {'arrested' if valve.flows[0].arrested else 'flows'}")
-    axes[0].set_ylabel("along the flow, downwards (mm)")
     letters(axes, 9)
-    figure.colorbar(circles, ax=axes, label="speed over that of the oil in the duct")
+    label = "speed over that of the oil in the duct"
+    figure.colorbar(ScalarMappable(SPEEDS, TIME), ax=axes, label=label, extend="both")
     return figure
 
 
-def cut(axis: Axes, flow: Flow) -> EllipseCollection:
-    """Draw the walls and the final grains within one radius of the plane of axis and field; return the
-    grains."""
+def cut(axis: Axes, flow: Flow) -> None:
+    """Draw the walls and the final grains, cut in the plane of axis and field."""
     state, scene = flow.result.state, flow.result.scene
-    duct, place = duct_of(scene), state["position"]
-    near = np.flatnonzero(np.abs(place[:, 1]) <= state["radius"])
-    near = near[np.argsort(-place[near, 1])]
-    width = 2 * state["radius"][near] / MILLI
-    circles = EllipseCollection(
-        width, width, np.zeros(len(near)), units="xy", offsets=place[near][:, [0, 2]] / MILLI,
-        offset_transform=axis.transData, edgecolors="white", linewidths=0.3, cmap="viridis",
-    )  # fmt: skip
-    circles.set_array(state["velocity"][near, 2] / oil_of(scene).speed)
-    circles.set_clim(0.0, FASTEST)
-    axis.add_collection(circles)
-    heights, radii = duct.profile()
-    for side in (-1, 1):
-        axis.plot(side * radii / MILLI, (heights - duct.length / 2) / MILLI, color="0.2", lw=1.5)
-    axis.set(aspect="equal", xlabel="along the field (mm)")
-    axis.set_ylim(duct.length / 2 / MILLI, -duct.length / 2 / MILLI)
-    plain(axis)
-    axis.grid(visible=False)
-    return circles
+    around = scenery(scene, [state], flow.result.time, flow.result.measures)
+    part = window([state], look=CUT)
+    colours = TIME(SPEEDS(state["velocity"][:, 2] / oil_of(scene).speed))[:, :3]
+    panel(axis, state, part, replace(around, edges=()), colours, look=CUT)
+    directions(axis, part, np.zeros(3), camera=CUT.camera)
 
 
 def table(valves: Sequence[ValveRuns]) -> str:

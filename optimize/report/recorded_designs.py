@@ -14,6 +14,7 @@ from tisim.io.reader import frames
 from tisim.io.recording import Recording
 from tisim.optimize.evaluation.runs import start_seed
 from tisim.optimize.problem.problem import Problem
+from tisim.optimize.report.report import spread
 from tisim.optimize.report.search_data import SearchData
 from tisim.optimize.search_folder import different_problem
 from tisim.optimize.settings import Settings, identity
@@ -52,10 +53,15 @@ def check_problem(data: SearchData, problem: Problem) -> None:
 
 
 def best_designs(data: SearchData, count: int) -> list[int]:
-    """Return the indices of the designs of the hall of fame, best first, at most a number of them."""
-    best = [k for k, one in enumerate(data.facts.get("best", ())) if one]
+    """Return the indices of some designs of the hall of fame, at most a number of them: the best ones; of a
+    front the compromise, and others spread along the front."""
+    best = [k for k, one in enumerate(data.facts.get("best", ())) if one][:count]
     ranked = sorted((rank, k) for k, rank in enumerate(data.facts.get("rank", ())) if rank)
-    return [*best, *(k for _, k in ranked if k not in best)][:count]
+    others = [k for _, k in ranked if k not in best]
+    left = count - len(best)
+    if len(data.objectives) > 1 and left > 0:
+        return [*best, *(others[k] for k in spread(len(others), left))]
+    return [*best, *others[:left]]
 
 
 def scenes(data: SearchData, problem: Problem, designs: Sequence[int]) -> dict[int, Any]:

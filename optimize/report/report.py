@@ -36,7 +36,7 @@ def best_table(outcome: Outcome) -> RenderableType:
     """
     columns = best_columns(outcome.problem, outcome.hall)
     places = outcome.settings.hall_of_fame if outcome.problem.several else len(outcome.hall)
-    indices = _spread(len(outcome.hall), places)
+    indices = spread(len(outcome.hall), places)
     headings, *rows = ((heading, *(text(values[k]) for k in indices)) for heading, values in columns.items())
     designs = max(1, (TERMINAL_WIDTH - max(len(row[0]) for row in rows)) // (1 + _widest(rows)))
     title = outcome.problem.title or outcome.problem.name
@@ -61,7 +61,7 @@ def shown_designs(outcome: Outcome, most: int) -> tuple[list[str], list[list[str
     shown, otherwise the first."""
     columns = best_columns(outcome.problem, outcome.hall)
     count = len(outcome.hall)
-    indices = _spread(count, most) if outcome.problem.several else range(min(count, most))
+    indices = spread(count, most) if outcome.problem.several else range(min(count, most))
     return list(columns), [[text(values[k]) for values in columns.values()] for k in indices]
 
 
@@ -129,7 +129,7 @@ def met_table(outcome: Outcome) -> RenderableType:
     return Group("", title, table)
 
 
-def _spread(number: int, places: int) -> list[int]:
+def spread(number: int, places: int) -> list[int]:
     """Return at most ``places`` evenly spaced indices out of ``number``, the first and the last included."""
     return sorted({round(k) for k in np.linspace(0, number - 1, min(number, places))})
 

@@ -118,7 +118,8 @@ def read_search(path: str | Path, search: str | None = None) -> SearchData:
 
     identity, settings = json.loads(attributes["identity"]), json.loads(attributes["settings"])
     problem = str(attributes["problem"])
-    designs = columns(f"{DESIGNS_TABLE}/genes")
+    genes = _rows(columns(GENES_TABLE))
+    designs = _choices(columns(f"{DESIGNS_TABLE}/genes"), genes)
     common = settings.get("ensemble", {}).get("common_starts") is not False
     runs = [part for part in stored.runs() if part.problem == problem]
     scene = regular_file.content(file.parent / "best_scene.toml") if search == shown else None
@@ -131,7 +132,7 @@ def read_search(path: str | Path, search: str | None = None) -> SearchData:
         identity=identity,
         versions=json.loads(attributes["versions"]),
         command=list(columns(COMMAND_TABLE).get("word", ())),
-        genes=_rows(columns(GENES_TABLE)),
+        genes=genes,
         objectives=_rows(columns(OBJECTIVES_TABLE)),
         constraints=_rows(columns(CONSTRAINTS_TABLE)),
         logbook=columns("logbook"),
@@ -158,6 +159,16 @@ def _shown(folder: Path) -> str:
         return str(json.loads(content or b"{}").get("search", ""))
     except (ValueError, AttributeError):
         raise InputError(f"{folder / SHOWN_FILE} must be JSON; received {content!r}") from None
+
+
+def _choices(columns: Mapping[str, Sequence[Any]], genes: Sequence[Row]) -> dict[str, Sequence[Any]]:
+    """Return the genes of designs, with choices as they are: numbers beside texts are stored as texts."""
+    found = dict(columns)
+    for row in genes:
+        if "choices" in row and row["name"] in found:
+            by_text = {str(choice): choice for choice in json.loads(row["choices"])}
+            found[row["name"]] = [by_text.get(str(value), value) for value in found[row["name"]]]
+    return found
 
 
 def _rows(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:

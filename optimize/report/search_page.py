@@ -21,15 +21,17 @@ from tisim.optimize.report.search_data import Row, RunOfDesign, SearchData, numb
 from tisim.optimize.tables import FEASIBLE, FRESH_STARTS, HIGH, LOW, error_of
 from tisim.plotting.colours import WIDE_RANGE
 from tisim.report.page import SEARCH_SCRIPTS, WATCHED_SEARCH_SCRIPTS, Page, Section, copied_text, table
+from tisim.report.run_report import LONGEST_TOML
 from tisim.report.scenery import colour_maps
 from tisim.report.viewer_data import SIZE_LIMIT
 from tisim.version import __version__
 
 CHOSEN_DESIGN = (
-    '<aside id="chosen" aria-label="Chosen design" aria-live="polite"></aside>'
+    '<aside id="chosen" aria-label="Chosen design"></aside><p id="told" class="unseen" role="status"></p>'
     '<a id="shown" href="#chosen" aria-label="To the chosen design"></a>'
 )
-"""The places of the panel of the chosen design, and of its short form on narrow pages."""
+"""The places of the panel of the chosen design, and of its short form: for screen readers, and on narrow
+pages."""
 
 
 @dataclass(frozen=True)
@@ -142,9 +144,10 @@ def designs_facts(data: SearchData, kept: Sequence[int]) -> dict[str, Any]:
             for key, head in ends.items()
         }
         columns["errors"] = columns["errors"] or [None for _ in kept]
+        shown = [*known, *(value for head in [*ends.values()][1:] for value in data.values.get(head, ()))]
         return {
             "name": name, "unit": row.get("unit", ""), "largest": row.get("direction") == "largest",
-            "logarithmic": _spread(known), "values": list(map(number_or_none, of(known))), **columns,
+            "logarithmic": _spread(shown), "values": list(map(number_or_none, of(known))), **columns,
         }  # fmt: skip
 
     fresh, quantities = data.facts.get(f"starts{FRESH_STARTS}", ()), _quantities(data)
@@ -213,9 +216,9 @@ def convergence(data: SearchData) -> Iterable[dict[str, Any]]:
         return
     marks = list(_held_out_best(data))
     if len(data.objectives) > 1:
-        for row in data.objectives:
-            for heading in (one for one in log if one.startswith(f"best {row['name']}")):
-                yield _panel(f"best {row['name']}", row.get("unit", ""), [_curve("", log[heading])])
+        headings = [one for one in log if one.startswith("best ")]
+        for row, heading in zip(data.objectives, headings, strict=False):
+            yield _panel(f"best {row['name']}", row.get("unit", ""), [_curve("", log[heading])])
         return
     (objective,) = data.objectives
     ends = [(m - s, m + s) for m, s in zip(log["mean"], log["std"], strict=True)]
@@ -244,7 +247,9 @@ def _curve(label: str, values: Sequence[float]) -> dict[str, Any]:
 
 
 def _panel(title: str, unit: str, curves: Sequence[Mapping[str, Any]], marks: Any = ()) -> dict[str, Any]:
-    every = [value for one in curves for value in one["values"] if value is not None]
+    sides = [one.get(name, ()) for one in curves for name in ("values", "low", "high")]
+    sides += [[mark["value"], mark["low"], mark["high"]] for mark in marks]
+    every = [value for side in sides for value in side if value is not None]
     return {
         "title": title, "unit": unit, "logarithmic": _spread(every), "curves": curves, "marks": list(marks)
     }  # fmt: skip
@@ -268,12 +273,12 @@ def _held_out_best(data: SearchData) -> Iterable[dict[str, Any]]:
 
 
 def _scenes(data: SearchData, options: SearchPageOptions) -> dict[int, str]:
-    """Return the scenes of designs as TOML, by index."""
+    """Return the scenes of designs as TOML, by index, except long ones."""
     scenes = dict(options.scenes or {})
     best = next((k for k, one in enumerate(data.facts.get("best", ())) if one), None)
     if data.best_scene and best is not None:
         scenes.setdefault(best, data.best_scene)
-    return scenes
+    return {k: toml for k, toml in scenes.items() if len(toml) <= LONGEST_TOML}
 
 
 def _notices(data: SearchData) -> Iterable[str]:

@@ -6,6 +6,7 @@ from scipy.stats import ks_2samp
 
 from tisim import InputError
 from tisim.geometry import BoxContainer, CylindricalContainer, SphericalContainer, WedgeContainer
+from tisim.geometry.container import Container
 
 ANGLE = np.radians(25)
 UNIT = 0.3
@@ -112,3 +113,26 @@ def test_a_point_on_the_axis_has_a_normal():
 def test_containers_that_hold_no_body_or_cannot_contract_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+@every_container
+def test_the_triangles_of_a_picture_lie_on_the_walls_and_cover_them(name):
+    """Corners lie on a wall and are not behind another; the area is that of all walls."""
+    container = CONTAINERS[name]
+    triangles = container.triangles(SIDE, UNIT)
+    distance, _ = container.distances(triangles.reshape(-1, 3), SIDE, UNIT)
+    np.testing.assert_allclose(distance.min(axis=1), 0, atol=1e-12)
+    sides = triangles[:, 1:] - triangles[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()
+    expected = {
+        "cylinder": np.pi * 1.5 * 2,
+        "sphere": 4 * np.pi,
+        "wedge": 1.8 * (1 + np.tan(ANGLE) + 1 / np.cos(ANGLE)) * 2,
+        "cube": 24.0,
+        "duct": 2 * (2 * 2) + 2 * (0.9 * 2),
+    }[name]
+    assert area == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_container_that_does_not_say_how_it_looks_has_no_triangles():
+    assert Container().triangles(SIDE, UNIT).shape == (0, 3, 3)

@@ -9,9 +9,10 @@ from tests.effects.contact.grains import USUAL as CONTACT
 from tests.scenes import scene
 from tisim import Box, Material, geometry
 from tisim.effects import Granular, Walls
-from tisim.plotting.cloud import caption, start_and_end
+from tisim.plotting.cloud import caption, panel, start_and_end
 from tisim.plotting.look import Look
 from tisim.plotting.scenery import NO_SCENERY, box_scenery, remaining, scenery, window
+from tisim.plotting.style import empty
 from tisim.rendering.camera import Window
 from tisim.sources import Cylinder, MagneticCylinders, MagneticSpheres, PoreFlow, Sphere
 
@@ -134,3 +135,14 @@ def test_a_steel_grain_and_a_rubber_grain_differ():
     for seen, own, other in ((left, *colours), (right, *colours[::-1])):
         seen, own, other = (one / np.linalg.norm(one) for one in (seen, own, other))
         assert np.linalg.norm(seen - own) < 0.5 * np.linalg.norm(seen - other)
+
+
+@pytest.mark.parametrize(
+    ("width", "label"), [(3.9999999999999996e-05, "10 µm"), (3.9e-5, "5 µm"), (4.0, "1 m"), (81.0, "20 m")]
+)
+def test_the_scale_bar_is_a_round_length_of_at_most_a_quarter(width, label):
+    """The first width is 40 µm up to rounding."""
+    axis = empty(2, 2).subplots()
+    nothing = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
+    panel(axis, nothing, Window(-width / 2, 0.0, width, width), pixels=10)
+    assert [text.get_text() for text in axis.texts] == [label]

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from tests.effects.contact.grains import USUAL
+from tests.report.conftest import growing_packing
 from tests.scenes import scene
 from tisim import Material, geometry
 from tisim.effects import Fixed, Granular, Oscillation, Rotation, Servo, Translation, Walls
 from tisim.effects.walls.placement import MARGIN, placed, placed_walls
-from tisim.geometry.tessellation import sharp_edges, tessellated
+from tisim.geometry.tessellation import FACETS_AROUND, sharp_edges, tessellated
 from tisim.plotting.look import USUAL as USUAL_LOOK
 from tisim.plotting.movie import _scales
 from tisim.plotting.scenery import scenery
@@ -120,6 +121,21 @@ def test_walls_in_a_picture_are_in_place():
     ):  # fmt: skip
         walls = scenery(made, around, time, measures).walls
         np.testing.assert_allclose([one.corners[..., 2].mean() for one in walls], heights, atol=1e-12)
+
+
+def test_the_container_of_a_packing_in_a_picture_grows_with_its_bodies():
+    made, states = growing_packing()
+    for state, wide in ((states[0], 0.002), (states[2], 0.008)):
+        around = scenery(made, [states[2]], 0.0, now=state)
+        (wall,) = around.walls
+        corners = wall.corners.reshape(-1, 3)
+        np.testing.assert_allclose(np.ptp(corners, axis=0), [wide, wide, 0.02])
+        np.testing.assert_allclose(corners.mean(axis=0), 0, atol=1e-4)
+        # Beside the box, the circles at both ends.
+        rims = around.edges[1]
+        assert len(rims) == 2 * FACETS_AROUND
+    assert not scenery(made, [states[2]], 0.0).walls
+    assert not scenery(made, [states[2]], 0.0, now=states[1]).walls
 
 
 def test_the_window_of_a_movie_contains_walls_at_each_frame():

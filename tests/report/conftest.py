@@ -103,3 +103,30 @@ def touching(record, rng):
         pairs = np.argwhere(np.triu(depth >= 0, 1))
         expected.append({(int(ids[i]), int(ids[j])): float(depth[i, j]) for i, j in pairs})
     return record(grains, made), expected
+
+
+def growing_packing():
+    """A scene of spheres in a cylinder of four of their diameters, and states in which they grow fourfold.
+
+    The second state has no sphere.
+    """
+    from tisim.effects import Confinement, HardRods
+    from tisim.geometry import CylindricalContainer
+    from tisim.shapes import SpherocylinderShape
+    from tisim.steppers import MechanicalContraction
+
+    balls = HardRods(rods=(SpherocylinderShape(length=0.0, diameter=0.002),))
+    made = scene(
+        2, stepper=MechanicalContraction(),
+        domain=Box(low=(-0.01,) * 3, high=(0.01,) * 3, periodic=(False, False, True)),
+        effects=(balls, Confinement(container=CylindricalContainer(diameter=4.0))),
+    )  # fmt: skip
+    place, turn = np.array([[0.0, 0, -0.005], [0.0, 0, 0.005]]), np.tile([1.0, 0, 0, 0], (2, 1))
+    states = [
+        {
+            "id": np.arange(n), "position": place[:n], "orientation": turn[:n], "radius": np.full(n, radius),
+            "shape": np.zeros(n, int),
+        }
+        for n, radius in ((2, 2.5e-4), (0, 0.0), (2, 1e-3))
+    ]  # fmt: skip
+    return made, states

@@ -77,6 +77,7 @@ def made_up(count, rng, objectives=("loss", "mass")):
             name: mean, error_of(name): np.full(count, 0.02), f"{name}{FRESH_STARTS}": fresh,
             f"{name} {LOW}{FRESH_STARTS}": fresh - 0.02, f"{name} {HIGH}{FRESH_STARTS}": fresh + 0.02,
         }  # fmt: skip
+    curves = [f"best {name} (J)" for name in objectives] if len(objectives) > 1 else ["best", "mean", "std"]
     run = [RunOfDesign(s, s > 1, 7 + s, dict.fromkeys(objectives, 0.5), "", 0.25) for s in range(3)]
     generation = np.sort(rng.integers(0, 20, count))
     return SearchData(
@@ -93,7 +94,7 @@ def made_up(count, rng, objectives=("loss", "mass")):
         constraints=[],
         logbook={
             "gen": list(range(20)), "starts": [100 - g for g in range(20)],
-            **{f"best {name} (J)": (1.0 / np.arange(1, 21)).tolist() for name in objectives},
+            **dict.fromkeys(curves, (1.0 / np.arange(1, 21)).tolist()),
         },
         facts={
             "gen": generation.tolist(), "rank": rank.tolist(), "best": (rank == 1).astype(int).tolist(),

@@ -4,27 +4,32 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from tests.report.conftest import particles
-from tisim import Material, Scene
+from tests.report.conftest import growing_packing, particles
+from tisim import Box, Material, Scene
 from tisim.effects import (
+    Confinement,
     Granular,
+    HardRods,
     Oscillation,
     Rotation,
     Servo,
     Translation,
     Walls,
 )
-from tisim.effects.walls.placement import placed
+from tisim.effects.walls.placement import placed, placed_container
 from tisim.geometry import (
     BoxSurface,
     ConicalSurface,
     CylindricalSurface,
     Disc,
     Plane,
+    SphericalContainer,
     SphericalSurface,
     TriangulatedSurface,
 )
-from tisim.report.bodies import bodies
+from tisim.report.bodies import bodies, container
+from tisim.shapes import SpherocylinderShape
+from tisim.steppers import MechanicalContraction
 
 SQUARE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
@@ -99,3 +104,37 @@ def test_a_servo_is_where_its_recorded_travel_puts_it():
     scene = walled(discs=[Disc(radius=0.5)], motion=Servo(force=1.0, direction=(0, 0, -2.0), limit=0.1))
     (body,) = bodies(scene, np.zeros(2), {"walls": np.array([0.0, 0.25])}, LOW, HIGH)
     np.testing.assert_allclose(body.poses[:, :3], [[0, 0, 0], [0, 0, -0.25]])
+
+
+def test_a_container_grows_with_its_bodies():
+    """It is drawn as at the last frame; factors and translations lead to its walls in all others."""
+    made, states = growing_packing()
+    (last, *_), drawn = [placed_container(made, states[-1])], container(made, states)
+    assert area(drawn.mesh) == pytest.approx(np.pi * 0.008 * 0.02, rel=2e-3)
+    np.testing.assert_allclose(drawn.stretches, [[0.25, 0.25, 1], [1, 1, 1], [1, 1, 1]], rtol=1e-12)
+    for state, by, pose in zip(states, drawn.stretches, drawn.poses, strict=True):
+        found = Turn.from_quat(pose[3:]).apply(by * drawn.mesh.vertices) + pose[:3]
+        now = placed_container(made, state) or placed_container(made, states[-1])
+        expected = np.unique(now.triangles.reshape(-1, 3), axis=0)
+        apart = np.linalg.norm(found[:, None] - expected, axis=2)
+        assert apart.min(axis=0).max() < 1e-12
+        assert apart.min(axis=1).max() < 1e-12
+    ends = drawn.places()
+    assert np.ptp(ends[: len(ends) // 2], axis=0)[0] == pytest.approx(0.002)
+    assert np.ptp(ends[len(ends) // 2 :], axis=0)[0] == pytest.approx(0.008)
+    np.testing.assert_allclose(np.ptp(last.triangles.reshape(-1, 3), axis=0), [0.008, 0.008, 0.02])
+
+
+def test_a_container_at_rest_has_no_poses_and_one_without_bodies_is_not_drawn():
+    rods = HardRods(rods=(SpherocylinderShape(length=0.0, diameter=0.002),))
+    made = Scene(
+        particles=particles(1), effects=(rods, Confinement(container=SphericalContainer())),
+        domain=Box(low=(-1,) * 3, high=(1,) * 3, periodic=(False,) * 3), duration=1.0,
+        stepper=MechanicalContraction(),
+    )  # fmt: skip
+    assert len(container(made, [{"radius": np.ones(1), "shape": np.zeros(1, int)}]).poses) == 0
+    assert container(made, [{"radius": np.ones(0)}]) is None
+    assert (
+        container(walled(discs=[Disc(radius=0.5)]), [{"radius": np.ones(1), "shape": np.zeros(1, int)}])
+        is None
+    )

@@ -9,16 +9,17 @@ import io
 import numpy as np
 import pytest
 
-from tests.report.conftest import scene
+from tests.report.conftest import growing_packing, scene
 from tisim import Open
 from tisim.effects import HardRods, HardSuperquadrics
+from tisim.effects.walls.placement import placed_container
 from tisim.io.reader import frames
 from tisim.report.compressed_trajectory import compress
 from tisim.report.run_report import run_report
 from tisim.report.view import view
 from tisim.report.viewer_data import ReportOptions
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
-from tisim.sources import Cylinder, MagneticCylinders, MagneticSpheres, Sphere
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField, MagneticSpheres, Sphere
 from tisim.steppers import MechanicalContraction
 
 pytestmark = pytest.mark.long
@@ -303,6 +304,50 @@ def test_rods_cover_their_area(record, opened, tmp_path):
         assert seen[1] == pytest.approx(area, rel=0.02)
         assert seen[2] == pytest.approx(4 * area, rel=0.02), "twice as large"
         assert silhouettes(page, np.pi, 0)[1] == pytest.approx(np.pi * 0.001**2, rel=0.03), "from its end"
+
+
+def test_a_container_is_where_its_bodies_are(record, opened, tmp_path):
+    """The matrix of its vertices leads to the walls in each frame."""
+    made, states = growing_packing()
+    html = run_report(record(made, states), tmp_path / "r.html")
+    with opened(html) as page:
+        reads = (
+            "[0, 2].map((f) => { const v = report.player.viewer, b = v.scene.bodies[0]; v.show(f);"
+            " const m = v.pose(v.bodies[0]), all = [];"
+            " for (let k = 0; k < b.vertices.length; k += 3) {"
+            "  const r = v.relative(b.vertices.slice(k, k + 3));"
+            "  all.push([0, 1, 2].map((i) => v.centre[i] + v.unit *"
+            "   (m[i] * r[0] + m[4 + i] * r[1] + m[8 + i] * r[2] + m[12 + i]))); }"
+            " return all; })"
+        )
+        found = np.array(page.evaluate(reads))
+        without = "(report.player.viewer.set({ walls: false }), report.player.viewer.draw(1), "
+        assert page.evaluate(f"{without}{PIXELS})") != page.evaluate(
+            f"(report.player.viewer.set({{ walls: true }}), report.player.viewer.draw(1), {PIXELS})"
+        )
+    for points, state in zip(found, (states[0], states[2]), strict=True):
+        expected = np.unique(placed_container(made, state).triangles.reshape(-1, 3), axis=0)
+        apart = np.linalg.norm(points[:, None] - expected, axis=2)
+        assert apart.min(axis=1).max() < 1e-7
+        assert apart.min(axis=0).max() < 1e-7
+
+
+def test_field_lines_are_drawn_where_they_are_and_can_be_hidden(record, opened, tmp_path):
+    magnetised = scene(2, effects=(MagneticField(constant=(0.0, 0.0, 0.5)),))
+    places = [[-0.005, 0, 0], [0.005, 0, 0]]
+    path = record(magnetised, [{"id": [0, 1], "position": places}] * 3)
+    html = run_report(path, tmp_path / "r.html", options=ReportOptions(lines="magnetic"))
+    with opened(html) as page:
+        ends = np.reshape(page.evaluate("report.player.scene.lines.ends"), (-1, 2, 3))
+        assert len({(round(1e6 * x), round(1e6 * y)) for x, y in ends[:, 0, :2].tolist()}) == 49
+        assert np.abs(ends).max() <= 0.01
+        shown = "(report.player.viewer.draw(1), " + PIXELS + ")"
+        pictures = [page.evaluate(shown)]
+        box = page.get_by_label("magnetic lines at 20 ms")
+        for checked in (False, True):
+            box.set_checked(checked)
+            pictures.append(page.evaluate(shown))
+    assert pictures[0] == pictures[2] != pictures[1]
 
 
 def test_superquadrics_cover_their_area(record, opened, tmp_path):

@@ -4,6 +4,7 @@ import html
 import json
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,11 +14,14 @@ from tests.report.searches import GENES, HOSTILE, HOSTILE_CHOICE, HOSTILE_NAME, 
 from tests.report.test_run_report import facts_of
 from tisim import InputError, Scene, optimize, run
 from tisim.cli.search import problem_of
-from tisim.optimize import Gene, Objective, Problem, Quantile
+from tisim.optimize import Choice, Gene, Objective, Problem, Quantile, Settings
+from tisim.optimize.evaluation.function_evaluator import FunctionEvaluator
 from tisim.optimize.report.recorded_designs import best_designs, check_problem, record
 from tisim.optimize.report.search_data import read_search, search_names
 from tisim.optimize.report.search_page import SearchPageOptions, search_html, search_report
+from tisim.optimize.search import search
 from tisim.optimize.storage.cache import Cache
+from tisim.optimize.tables import LOW
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +137,36 @@ def test_designs_with_starts_of_their_own_have_their_runs(tmp_path):
     assert sum(map(len, data.runs)) == outcome.evaluations
 
 
+def test_choices_of_numbers_and_texts_come_back(tmp_path):
+    """A column of both is stored as text."""
+    genes = [Choice("kind", ("auto", 3, 4.5)), Gene("x", "", 0.0, 1.0), Choice("wet", (True, False))]
+    names = ("best", "best of all")
+    asked = Problem.of_function(
+        lambda design, seed: [design["x"] + seed % 7, design["x"]], genes, names, name="mixed", code="1"
+    )
+    settings = Settings(
+        method="nsga2",
+        generations=1,
+        options={"population": 8},
+        ensemble={"common_starts": False, "confirm": 0},
+    )
+    with Cache(tmp_path / "search.h5") as cache:
+        outcome = search(asked, FunctionEvaluator(), cache, settings)
+    data = read_search(tmp_path)
+    decoded = [asked.genome.decode(point) for point in outcome.generations]
+    for k, design in enumerate(decoded):
+        assert data.design(k) == design
+        assert [type(value) for value in data.design(k).values()] == [
+            type(value) for value in design.values()
+        ]
+        assert len(data.runs[k]) == data.facts["starts"][k]
+    facts, _, _ = page_of(data)
+    assert [panel["title"] for panel in facts["convergence"]] == ["best best", "best best of all"]
+    assert facts["convergence"][1]["curves"][0]["values"] == pytest.approx(
+        outcome.logbook.select("best best of all"), rel=1e-6
+    )
+
+
 def test_a_statistic_is_as_the_search_has_it(tmp_path):
     """A mean over the runs would be another value."""
 
@@ -173,6 +207,16 @@ def test_curves_are_those_of_the_logbook(one):
     assert [mark["low"], mark["high"]] == pytest.approx(outcome.designs[0].intervals["gain"], rel=1e-6)
 
 
+def test_an_axis_is_logarithmic_if_all_that_it_shows_is_positive(rng):
+    data = made_up(50, rng, ("loss",))
+    positive = {name: np.geomspace(1e-3, 1.0, 50).tolist() for name in data.values}
+    data = replace(data, values=positive)
+    assert page_of(data)[0]["designs"]["objectives"][0]["logarithmic"]
+    low = next(name for name in positive if LOW in name)
+    data = replace(data, values=positive | {low: [-0.1] * 50})
+    assert not page_of(data)[0]["designs"]["objectives"][0]["logarithmic"]
+
+
 def test_the_worst_designs_are_left_out_to_keep_the_limit(rng, tmp_path):
     data = made_up(3000, rng)
     facts, text, page = page_of(data, limit=0.9)
@@ -211,6 +255,9 @@ def test_what_cannot_be_recorded_is_refused(one):
     _, folder = one
     data = read_search(folder)
     assert best_designs(data, 2) == [data.facts["best"].index(1), data.facts["rank"].index(2)]
+    front = made_up(300, np.random.default_rng(1))
+    ranks = [front.facts["rank"][k] for k in best_designs(front, 5)]
+    assert ranks == [1, 2, 8, 14, 20], "spread along the front"
     check_problem(data, problem("gain"))
     with pytest.raises(InputError, match=r"problem must be the one of the search demo-.*objectives"):
         check_problem(data, problem("gain", "mass"))

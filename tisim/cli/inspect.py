@@ -60,6 +60,10 @@ Clip = Annotated[
     list[str] | None,
     typer.Option(metavar="PART", help="Part of space that is drawn, in m, such as 'y<0.01'; repeatable."),
 ]
+Lines = Annotated[
+    str | None,
+    typer.Option(metavar="FIELD", help="Field whose lines are drawn: magnetic, electric or flow."),
+]
 IntoFolder = Annotated[
     Path | None,
     typer.Option(
@@ -78,6 +82,7 @@ def plot(
     view: View = "",
     crop: Crop = "",
     clip: Clip = None,
+    lines: Lines = None,
 ) -> None:
     """Draw pictures of a run.
 
@@ -92,7 +97,7 @@ def plot(
         with pictures.drawing(f"{file}"):
             from tisim.plotting.look import Look
 
-            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ())))
+            drawn = _pictures(trajectory, Look.of(colour, view, crop, tuple(clip or ()), lines))
         print_missing(trajectory.missing)
     output_folder.claim(out_folder, drawn, overwrite)
     for name, figure in drawn.items():
@@ -186,6 +191,7 @@ def movie(
     view: View = "",
     crop: Crop = "",
     clip: Clip = None,
+    lines: Lines = None,
 ) -> None:
     """Draw the trajectory of a run as a moving picture.
 
@@ -200,8 +206,8 @@ def movie(
         from tisim.plotting.movie import check, while_drawn
         from tisim.plotting.movie import movie as draw
 
-        look = Look.of(colour, view, crop, tuple(clip or ()))
-        check(trajectory, path, rate)
+        look = Look.of(colour, view, crop, tuple(clip or ()), lines)
+        check(trajectory, path, rate, look)
         output_folder.claim(path.parent, (path.name, while_drawn(path)), overwrite)
         with shown_progress("drawing") as progress:
             draw(trajectory, path, rate, progress, look)

@@ -11,7 +11,7 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import targets
-from tisim.cli.inspect import World, case_pictures, print_missing, trajectory_file
+from tisim.cli.inspect import Lines, World, case_pictures, print_missing, trajectory_file
 from tisim.cli.options import Overwrite, Plugins, given_options, nameable
 from tisim.console import err, shown_progress
 from tisim.errors import InputError, must
@@ -27,7 +27,7 @@ RUN_PAGE, SEARCH_PAGE, COST_PAGE = "a run", "a search", "a study of costs"
 PAGE_OF = {"search.h5": SEARCH_PAGE, "cost.h5": COST_PAGE}
 """Kinds of pages that are not of a run, by the file from which they are made."""
 OPTIONS_OF = {
-    RUN_PAGE: {"world": "--world", "fields": "--field", "contacts": "--contacts", "checks": "--checks"},
+    RUN_PAGE: {"world": "--world", "fields": "--field", "contacts": "--contacts", "checks": "--checks", "lines": "--lines"},
     SEARCH_PAGE: {"search": "--search", "designs": "--designs", "problem": "--problem"},
 }
 """The options of ``tisim report`` that are for one kind of page alone, by the names of its parameters."""
@@ -78,6 +78,7 @@ def report(
             help="Of a run: checks that 'tisim check --out' has written.",
         ),
     ] = None,
+    lines: Lines = None,
     search: Annotated[
         str | None,
         typer.Option(
@@ -115,7 +116,7 @@ def report(
     path = to or source.parent / "report.html"
     must(path.suffix in (".html", ".htm"), "--to", "a file NAME.html", str(path))
     if kind == RUN_PAGE:
-        _run(source, path, world, fields, limit, contacts, checks, overwrite)
+        _run(source, path, world, fields, limit, contacts, checks, lines, overwrite)
     elif kind == SEARCH_PAGE:
         _search(source, path, search, designs, problem, limit, overwrite)
     else:
@@ -138,21 +139,24 @@ def _kind(path: Path) -> tuple[str, Path]:
 
 def _run(
     file: Path, path: Path, world: int, fields: Sequence[str] | None, limit: float, contacts: bool,
-    checks: Path | None, overwrite: bool,
+    checks: Path | None, lines: str | None, overwrite: bool,
 ) -> None:  # fmt: skip
     from tisim.io.reader import frames
+    from tisim.plotting.field_lines import check_lines
     from tisim.plotting.time_series import mark_missing
     from tisim.report.run_report import read_checks, run_report
     from tisim.report.viewer_data import ReportOptions
 
     with frames(file, world) as trajectory, pictures.drawing(f"pictures of {file}"):
+        check_lines(trajectory.scene, lines)
         found = case_pictures(trajectory) if len(trajectory) > 1 else {}
         drawn = {
             name.removesuffix(".png").replace("_", " "): pictures.image(mark_missing(figure, trajectory))
             for name, figure in found.items()
         }
         print_missing(trajectory.missing)
-    options = ReportOptions(limit, fields or None, contacts, drawn, read_checks(checks) if checks else ())
+    rows = read_checks(checks) if checks else ()
+    options = ReportOptions(limit, fields or None, contacts, drawn, rows, lines)
     output_folder.claim(path.parent, (path.name,), overwrite)
     with err().status("writing"):
         run_report(file, path, world, options)

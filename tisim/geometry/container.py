@@ -67,6 +67,14 @@ class Container(Component):
         from the walls."""
         raise NotImplementedError(f"{type(self).__name__} must define points")
 
+    def triangles(self, side: np.ndarray, unit: float) -> np.ndarray:
+        """Return the corners of triangles that approximate the walls, m from the lower corner of the box,
+        shape (triangles, 3, 3), for pictures; by default there are none.
+
+        side : sides of the box (m, shape (3,)). unit : D (m).
+        """
+        return np.empty((0, 3, 3))
+
     @ti.func
     def volume(self, w, side, unit):
         """Return the volume (m^3)."""

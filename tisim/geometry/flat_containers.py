@@ -13,6 +13,7 @@ from tisim.backend.taichi import ti
 from tisim.components.component import Vector, option, parameter
 from tisim.errors import must
 from tisim.geometry.container import Axes, Container
+from tisim.geometry.tessellation import box_faces, fan
 
 SLOPE_PLANE, BACK_PLANE = 1, 2
 """Walls of a wedge; wall 0 is the bottom."""
@@ -89,6 +90,13 @@ class WedgeContainer(Container):
         x = (self.length * unit - margin - apex) * np.sqrt(numbers[:, 0])
         y = x * math.tan(self.angle) * numbers[:, 1]
         return np.column_stack([apex + x, margin + y, side[2] * numbers[:, 2]])
+
+    def triangles(self, side: np.ndarray, unit: float) -> np.ndarray:
+        long = self.length * unit
+        high, across = long * math.tan(self.angle), np.array([0.0, 0.0, side[2]])
+        apex, foot, top = np.array([[0.0, 0.0, 0.0], [long, 0.0, 0.0], [long, high, 0.0]])
+        walls = [(apex, foot), (apex, top), (foot, top)]
+        return np.concatenate([fan(np.array([a, b, b + across, a + across])) for a, b in walls])
 
     @ti.func
     def volume(self, w, side, unit):
@@ -178,6 +186,10 @@ class BoxContainer(Container):
     def points(self, numbers: np.ndarray, side: np.ndarray, unit: float, margin: float) -> np.ndarray:
         wide = self.widths(side, unit) - 2 * margin * np.array(self.hard)
         return side / 2 + wide * (numbers - 0.5)
+
+    def triangles(self, side: np.ndarray, unit: float) -> np.ndarray:
+        half = self.widths(side, unit) / 2
+        return box_faces(side / 2 - half, side / 2 + half, np.flatnonzero(self.hard).tolist())
 
     @ti.func
     def widths_of(self, w, side, unit):

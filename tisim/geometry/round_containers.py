@@ -11,6 +11,7 @@ from tisim.components.component import parameter
 from tisim.errors import must
 from tisim.geometry.container import Axes, Container
 from tisim.geometry.shape import SEAM
+from tisim.geometry.tessellation import sphere_surface, surface_of_revolution
 from tisim.numerics.vectors import normal_to
 
 
@@ -61,6 +62,11 @@ class CylindricalContainer(Container):
         x, y = rho * np.cos(angle), rho * np.sin(angle)
         return np.column_stack([side[0] / 2 + x, side[1] / 2 + y, side[2] * numbers[:, 2]])
 
+    def triangles(self, side: np.ndarray, unit: float) -> np.ndarray:
+        radius = self.diameter * unit / 2
+        profile = np.array([[radius, 0.0], [radius, side[2]]])
+        return surface_of_revolution(profile, np.array([*side[:2] / 2, 0.0]), np.array([0.0, 0.0, 1.0]))
+
     @ti.func
     def volume(self, w, side, unit):
         across = self.diameter(w) * unit
@@ -110,6 +116,9 @@ class SphericalContainer(Container):
         across, angle = np.sqrt(1 - z * z), 2 * np.pi * numbers[:, 2]
         direction = np.column_stack([across * np.cos(angle), across * np.sin(angle), z])
         return side / 2 + r[:, None] * direction
+
+    def triangles(self, side: np.ndarray, unit: float) -> np.ndarray:
+        return sphere_surface(side / 2, float(side[0]) / 2)
 
     @ti.func
     def volume(self, w, side, unit):

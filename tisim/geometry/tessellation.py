@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
 from itertools import product
 
@@ -23,6 +24,8 @@ FOLD = np.cos(np.radians(15))
 """An edge between two triangles is sharp if the cosine of the angle between their normals is below this."""
 BOX_EDGES = [(a, b) for a, b in product(range(8), repeat=2) if a < b and (a ^ b).bit_count() == 1]
 """Pairs of corners of a box, in the order of ``box_corners``, that are the ends of its edges."""
+BOX_FACES = (((0, 1, 3, 2), (4, 5, 7, 6)), ((0, 1, 5, 4), (2, 3, 7, 6)), ((0, 2, 6, 4), (1, 3, 7, 5)))
+"""Corners of a box around the lower and the upper face normal to each axis."""
 
 
 @singledispatch
@@ -46,18 +49,12 @@ def _(shape: TriangulatedSurface) -> np.ndarray:
 
 @tessellated.register
 def _(shape: BoxSurface) -> np.ndarray:
-    corners = box_corners(np.array(shape.low), np.array(shape.high))
-    faces = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
-    return np.concatenate([fan(corners[list(face)]) for face in faces])
+    return box_faces(np.array(shape.low), np.array(shape.high))
 
 
 @tessellated.register
 def _(shape: SphericalSurface) -> np.ndarray:
-    polar = np.linspace(0, np.pi, SPHERE_RINGS + 1)
-    profile = shape.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1)
-    # The triangles at the poles share their corner to the last bit.
-    profile[[0, -1], 0] = 0.0
-    return _revolved(profile, np.array(shape.centre), np.array([0.0, 0.0, 1.0]))
+    return sphere_surface(np.array(shape.centre), shape.radius)
 
 
 @tessellated.register
@@ -65,11 +62,20 @@ def _(shape: RevolvedSurface) -> np.ndarray:
     origin, direction, length, low, high = shape.generator()
     lines = [[(low, 0.0), (high, length)], [(0.0, 0.0), (low, 0.0)], [(0.0, length), (high, length)]]
     axis = np.array(direction) / np.linalg.norm(direction)
-    faces = [_revolved(np.array(line), np.array(origin), axis) for line in lines[: shape.face_count]]
-    return np.concatenate(faces)
+    profiles = [np.array(line) for line in lines[: shape.face_count]]
+    return np.concatenate([surface_of_revolution(one, np.array(origin), axis) for one in profiles])
 
 
-def _revolved(profile: np.ndarray, origin: np.ndarray, axis: np.ndarray) -> np.ndarray:
+def sphere_surface(centre: np.ndarray, radius: float) -> np.ndarray:
+    """Return the triangles of a sphere (m)."""
+    polar = np.linspace(0, np.pi, SPHERE_RINGS + 1)
+    profile = radius * np.stack([np.sin(polar), np.cos(polar)], axis=1)
+    # The triangles at the poles share their corner to the last bit.
+    profile[[0, -1], 0] = 0.0
+    return surface_of_revolution(profile, centre, np.array([0.0, 0.0, 1.0]))
+
+
+def surface_of_revolution(profile: np.ndarray, origin: np.ndarray, axis: np.ndarray) -> np.ndarray:
     """Return the triangles of a surface of revolution, without those without an area.
 
     profile : distance from the axis and coordinate along it, m, shape (points, 2).
@@ -91,6 +97,12 @@ def _revolved(profile: np.ndarray, origin: np.ndarray, axis: np.ndarray) -> np.n
 def box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return the corners of a box (m), shape (8, 3); the bits of their indices are x, y and z."""
     return np.array(list(product(*zip(low, high, strict=True))))
+
+
+def box_faces(low: np.ndarray, high: np.ndarray, axes: Sequence[int] = (0, 1, 2)) -> np.ndarray:
+    """Return the triangles of the faces of a box (m) that are normal to some axes."""
+    corners = box_corners(low, high)
+    return np.concatenate([fan(corners[list(face)]) for axis in axes for face in BOX_FACES[axis]])
 
 
 def fan(polygon: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.effects.base import Shaped
-from tisim.plotting.image import draw_solids
+from tisim.plotting.image import draw_solids, extent_of, window_of
+from tisim.plotting.scenery import NO_SCENERY, Scenery
 from tisim.rendering.camera import USUAL_CAMERA, Camera
 from tisim.rendering.solids import DrawnRods, DrawnSpheres, Solids
 from tisim.rendering.superquadrics import DrawnSuperquadrics
@@ -68,9 +69,13 @@ def solids_of(
 
 
 def draw_bodies(
-    axis: Axes, packing: PackedBodies, colours: np.ndarray, camera: Camera = USUAL_CAMERA
+    axis: Axes,
+    packing: PackedBodies,
+    colours: np.ndarray,
+    camera: Camera = USUAL_CAMERA,
+    around: Scenery = NO_SCENERY,
 ) -> None:
-    """Draw the bodies of a packing without perspective.
+    """Draw the bodies of a packing without perspective, and all of their surroundings.
 
     colours : red, green and blue (0..1) of each body, shape (n, 3).
     """
@@ -81,4 +86,8 @@ def draw_bodies(
         "orientation": packing.orientation,
         "shape": packing.shape,
     }
-    draw_solids(axis, solids_of(state, packing.shapes, colours), camera=camera)
+    solids = solids_of(state, packing.shapes, colours)
+    corners = [camera.project(around.points)[:, :2], *(extent_of(solids, camera) or ())]
+    every = np.concatenate([one.reshape(-1, 2) for one in corners])
+    part = window_of(every.min(axis=0), every.max(axis=0)) if len(every) else None
+    draw_solids(axis, solids, part, around.walls, around.edges, camera)

@@ -13,6 +13,7 @@ from tisim.effects.external.gravity import Gravity
 from tisim.engine.result import Result
 from tisim.plotting.bodies import shapes_of, solids_of
 from tisim.plotting.colours import colouring, plain_colours
+from tisim.plotting.field_lines import FieldLines
 from tisim.plotting.image import PIXELS, draw_solids
 from tisim.plotting.look import USUAL, Look
 from tisim.plotting.scenery import NO_SCENERY, Scenery, finite_grains, scenery, window
@@ -58,8 +59,13 @@ def start_and_end(
     figure = empty(10.4, 5.0, pad=0.1)
     axes = figure.subplots(1, 2)
     colours = colouring(scene, states, look.colour)
-    beside = [scenery(scene, states, time, known) for time, known in zip(times, measures, strict=True)]
+    each = zip(states, times, measures, strict=True)
+    beside = [scenery(scene, states, time, known, state) for state, time, known in each]
     part = window(states, beside, look)
+    if look.lines is not None:
+        with FieldLines(scene, look.lines) as field:
+            pairs = zip(beside, states, times, strict=True)
+            beside = [field.beside(around, state, time) for around, state, time in pairs]
     headings = "start", last
     for axis, state, heading, time, around in zip(axes, states, headings, times, beside, strict=True):
         tints = None if colours is None else colours.of(state)
@@ -134,8 +140,10 @@ def directions(
 
 
 def _scale_bar(axis: Axes, part: Window) -> None:
-    power = 10.0 ** np.floor(np.log10(part.width / 4))
-    length = power * max(k for k in (1, 2, 5) if k * power <= part.width / 4)
+    # A power of ten is not its own logarithm to the last bit.
+    most = part.width / 4 * (1 + 1e-9)
+    power = 10.0 ** np.floor(np.log10(most))
+    length = power * max(k for k in (1, 2, 5) if k * power <= most)
     x, y = part.left + 0.02 * part.width, part.bottom + 0.015 * part.height
     line = axis.plot([x, x + length], [y, y], color="0.2", lw=2, solid_capstyle="butt", zorder=4)[0]
     middle, above = x + length / 2, y + 0.012 * part.height

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 
 from tisim.errors import must
-from tisim.rendering.camera import USUAL_CAMERA, Camera, ClipPlane
+from tisim.rendering.camera import ALONG_Y, USUAL_CAMERA, Camera, ClipPlane
 
 Crop = tuple[float, float, float, float]
 """Left, right, bottom and top of a part of a picture, 0..1."""
@@ -20,18 +20,25 @@ class Look:
     """How a picture shows a scene.
 
     colour : the quantity that colours grains: "material", "radius", "speed", "temperature" or another
-        recorded field; by default the temperature or the material, where there are several. clip : planes
-        that cut grains and walls. crop : part of the whole picture that is shown.
+        recorded field; by default the temperature or the material, where there are several.
+    clip : planes that cut grains and walls. crop : part of the whole picture that is shown.
+    lines : the field whose lines are drawn, "magnetic", "electric" or "flow" (see ``FieldLines``).
     """
 
     camera: Camera = USUAL_CAMERA
     colour: str | None = None
     clip: tuple[ClipPlane, ...] = ()
     crop: Crop = WHOLE_PICTURE
+    lines: str | None = None
 
     @classmethod
     def of(
-        cls, colour: str | None = None, view: str = "", crop: str = "", clip: tuple[str, ...] = ()
+        cls,
+        colour: str | None = None,
+        view: str = "",
+        crop: str = "",
+        clip: tuple[str, ...] = (),
+        lines: str | None = None,
     ) -> Look:
         """Return the look that texts describe; InputError if they are invalid.
 
@@ -50,7 +57,7 @@ class Look:
             inside = 0 <= left < right <= 1 and 0 <= bottom < top <= 1
             must(inside, "crop", "0 <= left < right <= 1 and 0 <= bottom < top <= 1", crop)
             part = left, right, bottom, top
-        return cls(camera, colour, tuple(_plane(one) for one in clip), part)
+        return cls(camera, colour, tuple(_plane(one) for one in clip), part, lines)
 
 
 def _numbers(text: str, name: str, rule: str, count: int) -> list[float]:
@@ -78,3 +85,5 @@ def _plane(text: str) -> ClipPlane:
 
 USUAL = Look()
 """How pictures show a scene unless asked otherwise."""
+FROM_THE_SIDE = Look(camera=ALONG_Y)
+"""A picture as seen along y."""

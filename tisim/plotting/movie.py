@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from subprocess import CalledProcessError
 
@@ -20,6 +20,7 @@ from tisim.io.reader import Frames
 from tisim.plotting import cloud
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.colours import Colouring, chosen, sample, scaled, values_of
+from tisim.plotting.field_lines import FieldLines, check_lines
 from tisim.plotting.look import USUAL, Look
 from tisim.plotting.scenery import finite_grains, remaining, scenery, window
 from tisim.rendering.camera import Window
@@ -47,7 +48,7 @@ def movie(
     path : ends in .gif, or in .mp4 if ffmpeg or imageio-ffmpeg is installed; raise InputError otherwise.
     progress : called with the finished fraction, 0..1. look : view, crop, cuts and colours.
     """
-    check(frames, path, rate)
+    check(frames, path, rate, look)
     coloured, outermost, part = _scales(frames, look)
     figure = Figure(figsize=(SIDE + LEGEND * (coloured is not None), SIDE), facecolor="white")
     FigureCanvasAgg(figure)
@@ -61,13 +62,16 @@ def movie(
     unfinished = path.with_name(while_drawn(path))
     try:
         with (
+            nullcontext() if look.lines is None else FieldLines(frames.scene, look.lines) as field,
             _writer(path, rate) as writer,
             replacing(path, unfinished),
             writer.saving(figure, str(unfinished), DPI),
         ):
             for k, frame in enumerate(frames):
                 axis.clear()
-                around = scenery(frames.scene, [outermost], frame.time, frame.measures)
+                around = scenery(frames.scene, [outermost], frame.time, frame.measures, frame.arrays)
+                if field is not None:
+                    around = field.beside(around, frame.arrays, frame.time)
                 colours = None if coloured is None else coloured.of(frame.arrays)
                 cloud.panel(axis, frame.arrays, part, around, colours, shapes, look, int(SIDE * DPI))
                 cloud.directions(axis, part, cloud.gravity(frames.scene), camera=look.camera)
@@ -83,8 +87,10 @@ def while_drawn(path: Path) -> str:
     return f"{path.stem}.new{path.suffix}"
 
 
-def check(frames: Frames, path: Path, rate: int) -> None:
-    """Raise InputError if there are not enough frames, or if there is no writer for such a file."""
+def check(frames: Frames, path: Path, rate: int, look: Look = USUAL) -> None:
+    """Raise InputError if there are not enough frames, if the scene lacks the lines that are wanted, or if
+    there is no writer for such a file."""
+    check_lines(frames.scene, look.lines)
     must(0 < rate <= 100, "frames a second", "1 to 100", rate)
     must(len(frames) > 1, "file", "one with 2 frames or more", Words(f"{len(frames)} frames"))
     must(path.suffix in (".gif", ".mp4"), "movie", "a .gif or .mp4 file", path.name)
@@ -133,9 +139,10 @@ def _scales(frames: Frames, look: Look) -> tuple[Colouring | None, Arrays, Windo
     together = {key: np.concatenate([one[key] for one in outermost]) for key in ("position", "radius")}
     surroundings = []
     for k, time in enumerate(frames.times):
-        # Moving walls may extend farther between the first and the last frame.
+        # Moving walls may extend farther between the first and the last frame. Containers only grow.
         known = {key: float(series[k]) for key, series in frames.measures.items()}
-        surroundings.append(scenery(frames.scene, [together], float(time), known))
+        now = grains if k == len(frames) - 1 else None
+        surroundings.append(scenery(frames.scene, [together], float(time), known, now))
     part = window(outermost, surroundings, look)
     return None if name is None else scaled(frames.scene, name, values), together, part
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tisim.effects.walls.placement import placed_walls
+from tisim.effects.walls.placement import placed_container, placed_walls
 from tisim.geometry.tessellation import BOX_EDGES, box_corners
 from tisim.plotting.image import extent_of, window_of
 from tisim.plotting.look import USUAL, Look
@@ -69,21 +69,36 @@ def box_scenery(low: np.ndarray | None, high: np.ndarray | None) -> Scenery:
     return Scenery(edges=(edges,), points=corners, bounded=True)
 
 
+def wall_scenery(triangles: np.ndarray, edges: np.ndarray) -> Scenery:
+    """Return walls as glass. triangles : m, shape (n, 3, 3). edges : m, shape (k, 2, 3)."""
+    walls = (DrawnTriangles.of(triangles, np.array(WALL_COLOUR)),) if len(triangles) else ()
+    lines = (DrawnLines.of(edges, np.array(EDGE_COLOUR), EDGE_WIDTH),) if len(edges) else ()
+    return Scenery(walls=walls, edges=lines, points=triangles.reshape(-1, 3), bounded=bool(len(triangles)))
+
+
 def scenery(
-    scene: Scene, states: Sequence[Arrays], time: float, measures: Mapping[str, float] | None = None
+    scene: Scene,
+    states: Sequence[Arrays],
+    time: float,
+    measures: Mapping[str, float] | None = None,
+    now: Arrays | None = None,
 ) -> Scenery:
     """Return the surroundings of the grains of a scene at a time (s).
 
     states : the planes of walls end around their grains. measures : of the world at the time, which have the
-    positions of bodies that forces move; such a body is left out if they are not known.
+    positions of bodies that forces move; such a body is left out if they are not known. now : the state at
+    the time, as the container of a packing may grow with its bodies; it is left out if it is not known.
     """
     box, bodies = box_scenery(*scene.domain.bounds()), _bodies(scene)
     around = np.concatenate([box.points, *_extents(bodies), *_extents_of_grains(states)])
     placed = placed_walls(scene.effects, time, around, measures, FAR)
-    walls = [DrawnTriangles.of(one.triangles, np.array(WALL_COLOUR)) for one in placed if len(one.triangles)]
-    edges = [DrawnLines.of(one.edges, np.array(EDGE_COLOUR), EDGE_WIDTH) for one in placed if len(one.edges)]
-    points = np.concatenate([box.points, *(one.corners.reshape(-1, 3) for one in walls)])
-    return Scenery(tuple(bodies), tuple(walls), (*box.edges, *edges), points, bool(len(points)))
+    if now is not None and (container := placed_container(scene, now)) is not None:
+        placed.append(container)
+    each = [box, *(wall_scenery(one.triangles, one.edges) for one in placed)]
+    walls = tuple(part for one in each for part in one.walls)
+    edges = tuple(part for one in each for part in one.edges)
+    points = np.concatenate([one.points for one in each])
+    return Scenery(tuple(bodies), walls, edges, points, bool(len(points)))
 
 
 def _bodies(scene: Scene) -> list[Solids]:

@@ -38,6 +38,10 @@ USUAL_CAMERA = Camera()
 """The camera of pictures unless another is given."""
 
 
+ALONG_Y = Camera(azimuth=-90.0, elevation=0.0)
+"""The camera that looks along y: x is to the right and z upwards."""
+
+
 class Window(NamedTuple):
     """The rectangle of the projection that a picture shows: left, bottom, width and height, m."""
 

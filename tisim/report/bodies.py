@@ -1,16 +1,17 @@
-"""Bodies of a scene beside its particles, as a browser draws them: walls and magnets.
+"""Bodies of a scene beside its particles, as a browser draws them: walls, containers and magnets.
 
 Walls are triangles and the lines of their rims, in m. Magnets and fibres are solid cylinders and spheres.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tisim.effects.walls.placement import MARGIN, placed
+from tisim.effects.walls.placement import MARGIN, placed, placed_container
 from tisim.effects.walls.servo import Servo
 from tisim.effects.walls.walls import Walls
 from tisim.geometry.tessellation import bounded_planes, box_corners, fan, sharp_edges, tessellated
@@ -42,31 +43,35 @@ class Mesh:
 
 @dataclass
 class DrawnBody:
-    """A wall.
+    """A wall, or the container of a packing.
 
     name : of its effect. mesh : at the position of the body in its own frame.
     poses : for each frame the translation (m) and the quaternion x, y, z, w from the frame of the body to
         space, shape (frames, 7); empty for a body at rest.
+    stretches : for each frame the factors by which the body is longer along the axes of its frame, before it
+        is turned, shape (frames, 3); empty for a rigid body.
     """
 
     name: str
     mesh: Mesh
     poses: np.ndarray = field(default_factory=lambda: np.empty((0, 7)))
+    stretches: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
 
     def places(self) -> np.ndarray:
         """Return its vertices in space (m) at the first and at the last frame, shape (n, 3)."""
         if not len(self.poses):
             return self.mesh.vertices
-        ends = self.poses[[0, -1]]
-        turned = [Rotation.from_quat(pose[3:]).apply(self.mesh.vertices) + pose[:3] for pose in ends]
+        long = self.stretches[[0, -1]] if len(self.stretches) else np.ones((2, 3))
+        ends = zip(self.poses[[0, -1]], long, strict=True)
+        turned = [Rotation.from_quat(pose[3:]).apply(by * self.mesh.vertices) + pose[:3] for pose, by in ends]
         return np.concatenate(turned)
 
     def facts(self) -> dict[str, object]:
         """Return it as plain data, with coordinates of COORDINATE_DIGITS digits."""
         return {
-            "name": self.name, "vertices": _digits(self.mesh.vertices),
+            "name": self.name, "vertices": digits(self.mesh.vertices),
             "triangles": self.mesh.triangles.ravel().tolist(), "lines": self.mesh.lines.ravel().tolist(),
-            "poses": _digits(self.poses),
+            "poses": digits(self.poses), "stretches": digits(self.stretches),
         }  # fmt: skip
 
 
@@ -93,7 +98,7 @@ class DrawnMagnet:
         }  # fmt: skip
 
 
-def _digits(values: np.ndarray) -> list[float]:
+def digits(values: np.ndarray) -> list[float]:
     """Return numbers rounded to COORDINATE_DIGITS significant digits, in a row."""
     return [float(f"{value:.{COORDINATE_DIGITS}g}") for value in values.ravel().tolist()]
 
@@ -134,6 +139,26 @@ def bodies(
             body.poses = _poses(walls, times, travel.get(walls.label))
         found.append(body)
     return found
+
+
+def container(scene: Scene, states: Iterable[Mapping[str, np.ndarray]]) -> DrawnBody | None:
+    """Return the container of a packing at the states of frames; None without a container.
+
+    It is drawn as in the last state with bodies. In others it is as much smaller as they are.
+    """
+    each = [placed_container(scene, state) for state in states]
+    known = [one for one in each if one is not None]
+    if not known:
+        return None
+    last = known[-1]
+    body = DrawnBody(last.name, Mesh.of(last.triangles, last.edges))
+    if not last.fixed:
+        low, high = body.mesh.vertices.min(axis=0), body.mesh.vertices.max(axis=0)
+        corners = [(one or last).triangles.reshape(-1, 3) for one in each]
+        body.stretches = np.array([np.ptp(points, axis=0) / (high - low) for points in corners])
+        shift = np.array([points.min(axis=0) for points in corners]) - body.stretches * low
+        body.poses = np.column_stack([shift, np.tile([0.0, 0.0, 0.0, 1.0], (len(each), 1))])
+    return body
 
 
 def _poses(walls: Walls, times: np.ndarray, travel: np.ndarray | None) -> np.ndarray:

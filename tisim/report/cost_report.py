@@ -19,10 +19,11 @@ from tisim.report.viewer_data import SIZE_LIMIT
 from tisim.version import __version__
 
 CHOSEN_SETTING = (
-    '<aside id="chosen" aria-label="Chosen setting" aria-live="polite"></aside>'
+    '<aside id="chosen" aria-label="Chosen setting"></aside><p id="told" class="unseen" role="status"></p>'
     '<a id="shown" href="#chosen" aria-label="To the chosen setting"></a>'
 )
-"""The places of the panel of the chosen setting, and of its short form on narrow pages."""
+"""The places of the panel of the chosen setting, and of its short form: for screen readers, and on narrow
+pages."""
 MARK_MEANINGS = (
     "hollow: upper bound of an error",
     "dark ring: cheapest for a power of ten of the error",

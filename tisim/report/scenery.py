@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import colormaps
 
+from tisim.effects.walls.confinement import confinement
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.cloud import gravity
+from tisim.plotting.field_lines import LINE_COLOURS, FieldLines, ends
 from tisim.report import bodies
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence
 from tisim.shapes.particle_shape import ParticleShape
@@ -20,8 +22,13 @@ MOST_SHOWN = 97.0
 first; the others may be far away."""
 
 
-def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[str, object]:
-    """Return everything that is drawn beside the particles, as plain data."""
+def scenery(
+    sequence: FrameSequence, trajectory: CompressedTrajectory, lines: str | None = None
+) -> dict[str, object]:
+    """Return everything that is drawn beside the particles, as plain data.
+
+    lines : name of a field whose lines in the last frame are drawn (see ``FieldLines``).
+    """
     scene, domain = sequence.scene, sequence.scene.domain
     low, high = trajectory.low, trajectory.high
     box_low, box_high = domain.bounds()
@@ -43,6 +50,9 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         centre = np.array(magnet.centre)
         focus = np.minimum(focus[0], centre - magnet.radius), np.maximum(focus[1], centre + magnet.radius)
     walls = bodies.bodies(scene, trajectory.times, travel, *focus)
+    if confinement(scene) is not None:
+        held = bodies.container(scene, (sequence[k].arrays for k in trajectory.indices.tolist()))
+        walls += [] if held is None else [held]
     # Walls near the particles are in view as a whole, such as the hopper above a bed.
     size = float(np.linalg.norm(focus[1] - focus[0]))
     near = [points for points in (body.places() for body in walls) if _within(points, focus, size)]
@@ -58,7 +68,20 @@ def scenery(sequence: FrameSequence, trajectory: CompressedTrajectory) -> dict[s
         "bodies": [body.facts() for body in walls], "magnets": [magnet.facts() for magnet in magnets],
         "shapes": [_shape(shape) for shape in shapes_of(scene)], "gravity": gravity(scene).tolist(),
         "medianRadius": _median_radius(sequence),
+        "lines": None if lines is None else _field_lines(sequence, trajectory, lines, np.array(focus)),
     }  # fmt: skip
+
+
+def _field_lines(
+    sequence: FrameSequence, trajectory: CompressedTrajectory, name: str, around: np.ndarray
+) -> dict[str, object]:
+    """Return the lines of a field in the last frame, as plain data. around : points among the lines, m."""
+    last = int(trajectory.indices[-1])
+    time = float(sequence.times[last])
+    with FieldLines(sequence.scene, name) as field:
+        found = field.lines(sequence[last].arrays, time, around)
+    colour = [round(255 * part) for part in LINE_COLOURS[name]]
+    return {"name": name, "time": time, "colour": colour, "ends": bodies.digits(ends(found))}
 
 
 def _within(points: np.ndarray, box: tuple[np.ndarray, np.ndarray], margin: float) -> bool:

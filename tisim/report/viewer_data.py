@@ -28,6 +28,7 @@ class ReportOptions:
     contacts : whether to store the contacts of grains.
     pictures : further pictures as PNG, by title.
     checks : rows of text of a table of checks, from ``read_checks``.
+    lines : a field whose lines in the last frame are shown: "magnetic", "electric" or "flow"; None for none.
     logarithmic : whether quantities whose values spread over decades have logarithmic scales of colours.
     """
 
@@ -36,6 +37,7 @@ class ReportOptions:
     contacts: bool = True
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     checks: Sequence[Sequence[str]] = ()
+    lines: str | None = None
     logarithmic: bool = True
 
     def __post_init__(self) -> None:
@@ -62,18 +64,22 @@ def viewer_data(sequence: FrameSequence, options: ReportOptions, reserved: float
     reserved : bytes of the page for everything but the recording and the pictures.
     """
     trajectory, network, notices = recording(sequence, options, reserved)
-    facts, data = player_facts(sequence, trajectory, network)
+    facts, data = player_facts(sequence, trajectory, network, options.lines)
     return ViewerData(trajectory, facts | {"maps": colour_maps()}, data, notices)
 
 
 def player_facts(
-    sequence: FrameSequence, trajectory: CompressedTrajectory, network: ContactNetwork | None
+    sequence: FrameSequence,
+    trajectory: CompressedTrajectory,
+    network: ContactNetwork | None,
+    lines: str | None = None,
 ) -> tuple[dict[str, object], bytes]:
-    """Return what a browser needs to play a run: plain data, and the compressed frames."""
+    """Return what a browser needs to play a run: plain data, and the compressed frames. lines : a field whose
+    lines in the last frame are shown, or None."""
     parts = [one.data for one in trajectory.columns] + ([network.data()] if network is not None else [])
     facts: dict[str, object] = {
         "name": sequence.scene.name, "trajectory": trajectory.facts(), "lengths": [len(one) for one in parts],
-        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory),
+        "network": network.facts() if network else None, "scene": scenery(sequence, trajectory, lines),
         "materials": list(sequence.scene.materials),
     }  # fmt: skip
     return facts, b"".join(parts)

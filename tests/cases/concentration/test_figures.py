@@ -32,13 +32,18 @@ def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
         arrays = {"position": position, "radius": np.full(5, 7.5e-8), "moment": moment}
         return SimpleNamespace(arrays=arrays)
 
-    pairs = 1.5e-7 * np.array([[0, 0, 0], [1, 0, 0], [0, 0, 9], [1, 0, 9], [0, 9, 0.0]])
+    pairs = 1.5e-7 * np.array([[0, 0, 0], [1, 0, 0], [0, 0, 9], [1, 0, 9], [4, 9, 0.0]])
     trajectory = FewFrames([frame(10 * pairs), frame(pairs)])
     left, right = figures.pictures(trajectory)["chains.png"].axes
     np.testing.assert_allclose(right.lines[0].get_xdata(), [0.0, 1.0])
     np.testing.assert_allclose(right.lines[0].get_ydata(), [1.0, 5 / 3])
-    discs = left.collections[0]
-    # The farthest particle, the single one, is drawn first; positions are in µm, seen along y.
-    assert discs.get_array().mask.tolist() == [True, False, False, False, False]
-    middle = pairs.mean(axis=0)
-    np.testing.assert_allclose(discs.get_offsets()[0], 1e6 * (pairs[4] - middle)[[0, 2]])
+    # Seen along y, with x to the right and z upwards.
+    picture, (low, high, bottom, top) = left.images[0].get_array(), left.images[0].get_extent()
+    rows, columns, _ = picture.shape
+    row = (rows * (pairs[:, 2] - bottom) / (top - bottom)).astype(int)
+    seen = picture[row, (columns * (pairs[:, 0] - low) / (high - low)).astype(int)]
+    assert seen[:, 3].tolist() == [1] * 5
+    np.testing.assert_allclose(seen[[0, 2]], seen[[1, 3]], atol=0.02)
+    assert np.ptp(seen[4, :3]) < 0.02
+    assert np.ptp(seen[:4, :3], axis=1).min() > 0.1
+    assert np.abs(seen[0] - seen[2]).max() > 0.2

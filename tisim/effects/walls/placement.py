@@ -1,4 +1,5 @@
-"""Walls at a given time: the positions of points of bodies, and the triangles of all walls of a scene."""
+"""Walls at a given time: the positions of points of bodies, and the triangles of all walls of a scene and of
+the container of a packing."""
 
 from __future__ import annotations
 
@@ -10,6 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation as Turn
 
 from tisim.effects.base import Effect
+from tisim.effects.base.effect import SceneParts
+from tisim.effects.walls.confinement import confinement, hard_bodies
 from tisim.effects.walls.motion import Fixed, Motion
 from tisim.effects.walls.oscillation import Oscillation
 from tisim.effects.walls.rotation import Rotation
@@ -83,6 +86,17 @@ def placed_walls(
         fixed = not walls.motion.moves and not walls.planes
         found.append(PlacedWalls(walls.label, corners[near[0]], lines[near[1]], fixed))
     return found
+
+
+def placed_container(scene: SceneParts, state: Mapping[str, np.ndarray]) -> PlacedWalls | None:
+    """Return the walls of the container of a packing, which may grow with the bodies of a state; None if
+    there is no container, or no body."""
+    walls, (low, high) = confinement(scene), scene.domain.bounds()
+    if walls is None or low is None or high is None or not len(state["radius"]):
+        return None
+    unit = hard_bodies(scene)[0].unit_of(state)
+    triangles = low + walls.container.triangles(high - low, unit)
+    return PlacedWalls(walls.label, triangles, sharp_edges(triangles), not any(walls.container.scaled()))
 
 
 @lru_cache(maxsize=16)

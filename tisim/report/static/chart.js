@@ -26,7 +26,7 @@ function axisUnit(largest, unit) {
 }
 
 const HEIGHT = 230, MARGINS = { left: 62, right: 14, top: 12, bottom: 40 };
-const STROKES = ["c0", "c1", "c2", "c3", "c4", "c5"];
+const STROKES = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
 const TIME = { name: "time", symbol: "t", unit: "s", whole: false };
 
 class Chart {

@@ -15,7 +15,7 @@ class CostPage {
       this.panel(id("chosen"), k);
       this.table.markChosen();
       for (const plot of this.diagrams) plot.markChosen();
-      id("shown").textContent = this.describe(k, 0);
+      for (const name of ["shown", "told"]) id(name).textContent = this.describe(k, 0);
     });
     if (this.rows.length) choice.choose(Math.max(0, this.rows.findIndex((row) => row.errors[0]?.best)));
   }

@@ -80,6 +80,7 @@ class Player {
     const shown = [];
     if (scene.bodies.length) shown.push(check("walls", true, (on) => this.viewer.set({ walls: on })));
     if (scene.box) shown.push(check("box", true, (on) => this.viewer.set({ box: on })));
+    if (scene.lines) shown.push(check(`${scene.lines.name} lines at ${quantity(scene.lines.time, "s")}`, true, (on) => this.viewer.set({ lines: on })));
     if (this.network) shown.push(check("contacts", false, (on) => this.viewer.set({ contacts: on })));
     shown.push(check("outlines", true, (on) => this.viewer.set({ outlines: on })));
     shown.push(check("perspective", true, (on) => this.viewer.set({ flat: !on })));

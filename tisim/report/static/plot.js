@@ -160,7 +160,7 @@ class Axis {
 /** The colours of the page now: as names in the style, such as ink. */
 function inks() {
   const style = getComputedStyle(document.documentElement), name = (one) => style.getPropertyValue(`--${one}`).trim();
-  return Object.fromEntries(["ground", "panel", "ink", "quiet", "line", "accent", "bad", "c0", "c1", "c2", "c3", "c4", "c5"].map((one) => [one, name(one)]));
+  return Object.fromEntries(["ground", "panel", "ink", "quiet", "line", "accent", "bad", "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"].map((one) => [one, name(one)]));
 }
 
 /** A figure with a canvas, and above it a canvas for all that follows the pointer. */

@@ -282,7 +282,7 @@ class SearchPage {
       panel.show(k);
       this.table.markChosen();
       for (const plot of [...this.plots, ...this.pairPlots, this.parallel]) plot.markChosen();
-      bar.textContent = designs.describe(k);
+      for (const place of [bar, id("told")]) place.textContent = designs.describe(k);
       this.clouds?.show(k, designs.named(k), (other) => designs.choose(other));
     });
     this.tell();

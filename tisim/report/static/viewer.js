@@ -231,7 +231,7 @@ uniform mat4 pose;
 out vec3 at;
 flat out vec3 outward;
 void main() {
-  outward = mat3(view) * mat3(pose) * normal;
+  outward = normalize(mat3(view) * mat3(pose) * normal);
   at = (view * pose * vec4(place, 1.0)).xyz;
   gl_Position = projection * vec4(at, 1.0);
 }`;
@@ -327,7 +327,7 @@ class Viewer {
     this.chosen = -1;
     this.options = {
       colour: null, range: [0, 1], map: null, size: null, scale: 1, flat: false, walls: true, magnets: "solid",
-      box: true, contacts: false, outlines: true, cut: null, dark: false,
+      box: true, lines: true, contacts: false, outlines: true, cut: null, dark: false,
     };
     const { low, high } = scene.focus;
     this.centre = low.map((x, k) => (x + high[k]) / 2);
@@ -402,6 +402,7 @@ class Viewer {
     this.bodies = this.scene.bodies.map((body, k) => ({ ...this.buildBody(body), k }));
     this.boxLines = this.lines(this.boxEdges());
     this.contactLines = this.lines([]);
+    this.fieldLines = this.lines((this.scene.lines?.ends ?? []).map((x, k) => (x - this.centre[k % 3]) / this.unit));
     this.image = null;
     if (this.options.map) this.setMap(this.options.map, this.options.discrete);
   }
@@ -777,9 +778,12 @@ class Viewer {
   }
 
   pose(body) {
-    const poses = body ? this.around().bodies[body.k]?.poses : null, own = 7 * this.part.frame;
-    if (!poses?.length) return Matrix.pose([0, 0, 0, 0, 0, 0, 1]);
-    const [a, b, c, ...q] = poses.slice(own, own + 7), turn = Matrix.pose([0, 0, 0, ...q]);
+    const around = body ? this.around().bodies[body.k] : null, own = this.part.frame;
+    if (!around?.poses?.length) return Matrix.pose([0, 0, 0, 0, 0, 0, 1]);
+    const [a, b, c, ...q] = around.poses.slice(7 * own, 7 * own + 7), turn = Matrix.pose([0, 0, 0, ...q]);
+    (around.stretches ?? []).slice(3 * own, 3 * own + 3).forEach((longer, k) => {
+      for (let m = 0; m < 3; m++) turn[4 * k + m] *= longer;
+    });
     // From relative coordinates to relative coordinates: R (centre + unit x) + shift.
     const moved = [0, 1, 2].map((m) => turn[m] * this.centre[0] + turn[4 + m] * this.centre[1] + turn[8 + m] * this.centre[2]);
     [a, b, c].forEach((x, m) => { turn[12 + m] = (moved[m] + x - this.centre[m]) / this.unit; });
@@ -799,6 +803,7 @@ class Viewer {
     gl.uniform2f(places.screen, this.canvas.width * samples, this.canvas.height * samples);
     if (options.box) draw(this.boxLines, null, [ink, ink, ink, 1], [0.9, 0]);
     if (options.walls) for (const body of this.bodies) draw(body.lines, body, [ink, ink * 1.02, ink * 1.06, 1], [1.1, 0]);
+    if (options.lines && this.scene.lines) draw(this.fieldLines, null, [...this.scene.lines.colour.map((x) => x / 255 + (options.dark ? 0.2 : 0)), 1], [1.4, 0]);
     if (options.contacts && this.network) draw(this.contactLines, null, options.dark ? [0.98, 0.72, 0.3, 1] : [0.72, 0.2, 0.1, 1], [0.4, 6]);
   }
 
