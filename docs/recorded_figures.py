@@ -22,7 +22,7 @@ from tisim.report.scenery import colour_maps
 GALLERY = "gallery"
 """Name of the page with the questions and findings."""
 SECTION = re.compile(r"^## (?P<question>.+?)\n(?P<text>.*?)(?=^## |\Z)", re.M | re.S)
-SCRIPTS = ("trajectory.js", "viewer.js", "player.js", "chart.js")
+SCRIPTS = ("parts.js", "trajectory.js", "viewer.js", "player.js", "chart.js")
 """The scripts of a report that its viewer needs."""
 FIGURE = """<figure class="recording" data-recording="$name">
 <div class="screen"><img src="$picture" width="$across" height="$upwards" alt="$alt" loading="lazy">

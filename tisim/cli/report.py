@@ -27,9 +27,12 @@ RUN_PAGE, SEARCH_PAGE, COST_PAGE = "a run", "a search", "a study of costs"
 PAGE_OF = {"search.h5": SEARCH_PAGE, "cost.h5": COST_PAGE}
 """Kinds of pages that are not of a run, by the file from which they are made."""
 OPTIONS_OF = {
-    RUN_PAGE: {"world": "--world", "fields": "--field", "contacts": "--contacts", "checks": "--checks", "lines": "--lines"},
+    RUN_PAGE: {
+        "world": "--world", "fields": "--field", "contacts": "--contacts", "checks": "--checks",
+        "lines": "--lines",
+    },
     SEARCH_PAGE: {"search": "--search", "designs": "--designs", "problem": "--problem"},
-}
+}  # fmt: skip
 """The options of ``tisim report`` that are for one kind of page alone, by the names of its parameters."""
 
 
