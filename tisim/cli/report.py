@@ -35,7 +35,7 @@ OPTIONS_OF = {
         "lines": "--lines",
     },
     SEARCH_PAGE: {"search": "--search", "designs": "--designs", "problem": "--problem"},
-}
+}  # fmt: skip
 """The options of ``tisim report`` that are for one kind of page alone, by the names of its parameters."""
 
 

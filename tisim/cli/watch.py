@@ -16,7 +16,7 @@ import typer
 
 from tisim.cli.inspect import World
 from tisim.cli.options import Plugins, nameable
-from tisim.errors import must
+from tisim.errors import Words, must
 from tisim.files import regular_file
 from tisim.streams import say
 
@@ -71,7 +71,11 @@ def _answers(path: Path, world: int) -> Replies:
         return WatchedSearch(path).answers
     from tisim.watch.run import WatchedRun
 
-    return WatchedRun(path, world).answers
+    of_costs = regular_file.is_folder(path) and regular_file.exists(path / "cost.h5")
+    must(not of_costs, "folder to watch", "one of a run or a search", Words(f"{path}, of a study of costs"))
+    run = WatchedRun(path, world)
+    run.check()
+    return run.answers
 
 
 @contextmanager

@@ -96,6 +96,12 @@ class WatchedRun:
         # The end of the run, and the state of the files that was read last with its number of frames.
         self._end, self._read = "", (tuple[Any, ...](), 0)
 
+    def check(self) -> None:
+        """Raise InputError if there is a file that is not of a run, or that has no such world."""
+        if (file := self._file()) is not None:
+            with frames(file, self._world):
+                pass
+
     @property
     def answers(self) -> Replies:
         """Return the functions that answer requests: for the page, and for news since a frame."""
