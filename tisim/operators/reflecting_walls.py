@@ -45,7 +45,9 @@ class ReflectingWalls(Operator):
     any_order: ClassVar[bool] = True
     fields: ClassVar = ("radius",)
 
-    planes: tuple[Plane, ...] = option("planes, with particles on the side to which the normals point", ())
+    planes: tuple[Plane, ...] = option(
+        "planes, with particles on the side to which the normals point", (), examples=[(Plane(),)]
+    )
     cylinders: tuple[CylindricalSurface, ...] = option("cylinders, with particles inside", ())
     spheres: tuple[SphericalSurface, ...] = option("spheres, with particles inside", ())
 
