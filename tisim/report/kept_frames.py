@@ -1,8 +1,8 @@
-"""Frames of a trajectory that are read several times, and kept in memory while there is room."""
+"""Sequences of frames in memory: of a trajectory, kept while there is room, and of a list."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -52,3 +52,22 @@ class KeptFrames:
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))
+
+
+class ListedFrames:
+    """A list of at least one frame as a sequence."""
+
+    def __init__(self, scene: Scene, frames: Sequence[Frame]) -> None:
+        self.scene, self._frames = scene, frames
+        self.times = np.array([frame.time for frame in frames])
+        names = frames[0].measures
+        self.measures = {name: np.array([frame.measures[name] for frame in frames]) for name in names}
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, k: int) -> Frame:
+        return self._frames[k]
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(self._frames)

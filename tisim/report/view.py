@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-
-import numpy as np
 
 from tisim.engine.result import Result
 from tisim.errors import Words, must
@@ -14,39 +12,14 @@ from tisim.files import regular_file
 from tisim.io.reader import Frame, RecordedWorld, frames
 from tisim.notebook import VIEWER_HEIGHT, ViewerCell
 from tisim.report.compressed_trajectory import FrameSequence
-from tisim.report.kept_frames import KeptFrames
+from tisim.report.kept_frames import KeptFrames, ListedFrames
 from tisim.report.page import Page
 from tisim.report.viewer_data import ReportOptions, viewer_data
-from tisim.scene.scene import Scene
 
 CELL_LIMIT = 5.0
 """Default for the largest size of a page in a notebook, which stores it, MB."""
 CELL_RESERVED_BYTES = 0.1e6
 """Bytes of such a page for everything but the recording, without large walls."""
-
-
-class StartAndEnd:
-    """The start and the end of a result as frames.
-
-    failure : reason why the run failed; "" if it did not.
-    """
-
-    def __init__(self, result: Result) -> None:
-        self.failure = result.status.reason if result.status.failed else ""
-        self.scene: Scene = result.scene
-        self.times = np.array([0.0, result.time])
-        self.measures: Mapping[str, np.ndarray] = {}
-        steps = result.work.get("steps", 0)
-        self._frames = Frame(0.0, 0, result.start), Frame(result.time, steps, result.state)
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    def __getitem__(self, k: int) -> Frame:
-        return self._frames[k]
-
-    def __iter__(self) -> Iterator[Frame]:
-        return iter(self._frames)
 
 
 def view(
@@ -70,10 +43,11 @@ def view(
     """
     options = ReportOptions(limit=limit, fields=fields, contacts=contacts)
     ViewerCell("", height)  # refuses a wrong height before anything is read
+    # Before its state is read: otherwise a failed run would warn.
+    reason = run.status.reason if isinstance(run, Result) and run.status.failed else ""
     with _frames(run, world) as sequence:
         must(len(sequence) > 0, "run", "one with a frame", Words("one with none yet"))
         data = viewer_data(sequence, options, CELL_RESERVED_BYTES)
-        reason = sequence.failure if isinstance(sequence, StartAndEnd) else ""
     page = Page(
         title=sequence.scene.name,
         state="failed" if reason else "ok",
@@ -90,7 +64,8 @@ def view(
 @contextmanager
 def _frames(run: Result | RecordedWorld | str | Path, world: int) -> Iterator[FrameSequence]:
     if isinstance(run, Result):
-        yield StartAndEnd(run)
+        steps = run.work.get("steps", 0)
+        yield ListedFrames(run.scene, (Frame(0.0, 0, run.start), Frame(run.time, steps, run.state)))
     elif isinstance(run, RecordedWorld):
         yield run
     else:

@@ -11,12 +11,10 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
-
-import numpy as np
 
 from tisim.engine.result import Result
 from tisim.files import regular_file
@@ -25,7 +23,7 @@ from tisim.plotting import time_series
 from tisim.report import tables
 from tisim.report.compressed_trajectory import compress
 from tisim.report.contact_network import contact_network, has_contacts
-from tisim.report.kept_frames import KeptFrames
+from tisim.report.kept_frames import KeptFrames, ListedFrames
 from tisim.report.page import WATCHED_RUN_SCRIPTS, Page, text_data
 from tisim.report.run_report import numbers, result_of, rounding, run_page, status_of, summary
 from tisim.report.viewer_data import ReportOptions, player_facts
@@ -49,25 +47,6 @@ class _Opened:
     scene: Scene
     key: str
     first: Frame
-
-
-class _Some:
-    """Some frames of a run, in memory: the first, and new ones."""
-
-    def __init__(self, scene: Scene, frames: Sequence[Frame]) -> None:
-        self.scene, self._frames = scene, frames
-        self.times = np.array([frame.time for frame in frames])
-        names = frames[0].measures
-        self.measures = {name: np.array([frame.measures[name] for frame in frames]) for name in names}
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    def __getitem__(self, k: int) -> Frame:
-        return self._frames[k]
-
-    def __iter__(self) -> Iterator[Frame]:
-        return iter(self._frames)
 
 
 def _reached(sequence: Frames) -> str:
@@ -229,7 +208,7 @@ class WatchedRun:
         self, opened: _Opened, new: Sequence[Frame], chosen: Sequence[int]
     ) -> tuple[dict[str, Any], bytes, str]:
         """Return new frames as a part of a recording, with the points of the curves, and their rounding."""
-        some = _Some(opened.scene, [opened.first, *new])
+        some = ListedFrames(opened.scene, [opened.first, *new])
         trajectory = compress(some, range(1, len(some)), 1, self._options.fields, False)
         contacts = self._options.contacts and has_contacts(opened.scene)
         network = contact_network(some, trajectory) if contacts else None
