@@ -127,10 +127,15 @@ def test_bodies_of_one_family_collide_as_in_a_scene_of_their_own(shape):
 
 @pytest.mark.slow
 def test_all_bodies_come_to_rest_on_a_floor():
-    """A rod lies on both ends, a brick on its largest face, a sphere and an ellipsoid on one point."""
+    """A rod lies on both ends, a brick on its largest face, a sphere and an ellipsoid on one point.
+
+    The ellipsoid starts with its shortest axis upright: nothing damps the rocking of one that leans.
+    """
     shapes = (ROD, BALL, EGG, BRICK)
-    lean = Rotation.from_rotvec([[0, np.pi / 2 - 0.2, 0], [0, 0, 0], [0.3, 0, 0], [np.pi / 2 - 0.2, 0, 0]])
-    place = np.column_stack([8e-3 * np.arange(4), np.zeros(4), [1.2e-3, 1.01e-3, 2e-3, 1.3e-3]])
+    lean = Rotation.from_rotvec(
+        [[0, np.pi / 2 - 0.2, 0], [0, 0, 0], [np.pi / 2, 0, 0], [np.pi / 2 - 0.2, 0, 0]]
+    )
+    place = np.column_stack([8e-3 * np.arange(4), np.zeros(4), [1.2e-3, 1.01e-3, 0.71e-3, 1.3e-3]])
     made = moving(
         shapes, place, (STICKING, WEIGHT, FLOOR), 2e-6, 300_000, shape=np.arange(4), materials=material(),
         orientation=lean.as_quat(scalar_first=True),
@@ -144,8 +149,8 @@ def test_all_bodies_come_to_rest_on_a_floor():
     face = Rotation.from_quat(state["orientation"][3], scalar_first=True).apply([0, 1, 0])
     assert abs(rod[2]) < 1e-4
     assert abs(face[2]) > 1 - 1e-4
-    heights = state["position"][[0, 1, 3], 2]
-    np.testing.assert_allclose(heights, [D / 2, D, BRICK.semi_axes[1]], rtol=5e-3)
+    heights = state["position"][:, 2]
+    np.testing.assert_allclose(heights, [D / 2, D, EGG.semi_axes[1], BRICK.semi_axes[1]], rtol=5e-3)
 
 
 @pytest.mark.slow
