@@ -131,8 +131,8 @@ def by_hand(scene, error=None, part=None, kind=None):
 def settings(scene):
     """Return the manual settings for scenes like this one, from coarse to fine, by the kind of stepper.
 
-    Solid contacts are compared with leapfrogs alone. Of two spheres that mostly fly, adaptive steps are 18
-    times as cheap, but in a crowd some pair is always in contact, and all share the step.
+    Solid contacts are compared with leapfrogs alone: two spheres that mostly fly take far fewer adaptive
+    steps, but not the spheres of ``test_adaptive_steps_do_not_pay_in_a_crowd``.
     """
     choice, adaptive = scene.choice(), not any(effect.leapfrog for effect in scene.effects)
     adaptive = adaptive and not any(isinstance(one, laws.PairForce) and one.solid for one in scene.effects)
@@ -163,6 +163,26 @@ def test_cost_of_the_choice_and_of_the_best_manual_settings(name, capsys):
             f"\n{name:25s} {own:.0f} force evaluations, best by hand {best:.0f} ({which}): {own / best:.2f}"
         )
     assert own <= 1.5 * best
+
+
+@pytest.mark.slow
+def test_adaptive_steps_do_not_pay_in_a_crowd():
+    """Of 64 spheres some are always in contact, and all share the step."""
+    radius, density, young = 1e-3, 2e3, 1e7
+    speed = 0.01 * np.sqrt(young / density)
+    places = 2.3 * radius * (0.5 + np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3))
+    velocity = speed * np.random.default_rng(1).normal(size=(64, 3))
+    crowd = tisim.Scene(
+        particles=tisim.Particles(position=places, velocity=velocity, radius=radius, density=density),
+        effects=(laws.Hertz(young=young, poisson=0.3),),
+        domain=tisim.Box(low=(0, 0, 0), high=(9.2 * radius,) * 3),
+        duration=20 * radius / speed,
+    )
+    own, adaptive = (
+        work_of([tisim.run(one)]) for one in (crowd, by_hand(crowd, error=3e-3, kind="collocation 3"))
+    )
+    assert isinstance(crowd.choice().stepper, Verlet)
+    assert own < 0.8 * adaptive
 
 
 def magnet(**more):
