@@ -118,7 +118,7 @@ class Outcome(ShownInNotebook):
     identity : see optimize.settings. name : name of its group in the cache file.
     """
 
-    shown_by = "tisim.optimize.report.cell:outcome_cell"
+    shown_by = "tisim.optimize.report.report:outcome_cell"
     problem: Problem
     settings: Settings
     identity: Mapping[str, Any]

@@ -1,7 +1,7 @@
 """Objects that notebooks show: as HTML with a table and pictures, and as a viewer of particles in a cell.
 
 Notebooks call ``_repr_html_`` of the last value of a cell, so that nothing of IPython is needed here. Text is
-escaped. Colours are those of the notebook, which may be dark.
+escaped. Colours follow the theme of the notebook, light or dark.
 """
 
 from __future__ import annotations

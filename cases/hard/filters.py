@@ -36,9 +36,7 @@ AT_ORIGIN = (0.0, 0.0, 0.0)
 HELD_BY_FIELD = Capture(release=Release())
 
 
-def colloids(
-    position, balls, *effects, field=0.0, off=1e30, steps=LONGEST_STEPS, flow=0.0, longest=STEP_OF_COLLOIDS
-):
+def colloids(position, balls, *effects, field=0.0, off=1e30, flow=0.0, longest=STEP_OF_COLLOIDS):
     """Return a scene of colloids near balls that are magnetised along x while a field (T) is on.
 
     off : end of the field, s. flow : velocity of the water along z, m/s. longest : step, s.
@@ -67,7 +65,7 @@ def colloids(
             *effects,
         ),
         stepper=Brownian(**COLLOID_WATER, control=DriftLimit(longest=longest, shortest=1e-12, drift=1.0)),
-        duration=steps * STEP_OF_COLLOIDS,
+        duration=LONGEST_STEPS * STEP_OF_COLLOIDS,
     )
 
 
@@ -89,7 +87,7 @@ def around(distance):
     "magnets that touch and that overlap.",
     Criterion("least part of the colloids that is captured", least=0.9),
     Criterion("overlap of a colloid with a magnet, in radii", 1e-9),
-    Criterion("captured colloids that touch no magnet, by 0.001 radii", 0, 0),
+    Criterion("captured colloids farther than 0.001 radii from every magnet", 0, 0),
     Criterion("captures without a field", 0, 0),
     Criterion("displacement without a field, over its bound by diffusion", 1),
     Criterion("colloids missing", 0, 0),

@@ -229,7 +229,7 @@ class PackedFilter:
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
             x, y, z = self.cells or (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
-            # The speed of the tube is the mean over the square around it.
+            # PoreFlow takes the mean velocity over the square around the tube.
             tube = self.matrix.tube is not None
             flow = PoreFlow(
                 low=(left, front, first),

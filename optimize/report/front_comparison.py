@@ -15,9 +15,9 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
-from deap import base
 from deap.benchmarks.tools import hypervolume
 from numpy.typing import NDArray
 from rich.table import Table
@@ -40,18 +40,6 @@ HYPERVOLUME_NOTE = (
 )
 VIOLATIONS_NOTE = "violated: designs whose mean violates a constraint, which do not count"
 Points = NDArray[np.float64]
-
-
-class _Costs(base.Fitness):
-    """Costs as DEAP's hypervolume reads them."""
-
-    def __init__(self, costs: Points) -> None:
-        self.wvalues = tuple((-costs).tolist())
-
-
-class _Point:
-    def __init__(self, costs: Points) -> None:
-        self.fitness = _Costs(costs)
 
 
 @dataclass(frozen=True)
@@ -118,7 +106,9 @@ def _volume(scaled: Points) -> float:
     inside = np.maximum(scaled[(scaled < reference).all(axis=1)], 0.0)
     if not len(inside):
         return 0.0
-    return float(hypervolume([_Point(one) for one in inside], reference) / reference.prod())
+    # DEAP maximises, and reads fitness.wvalues.
+    front = [SimpleNamespace(fitness=SimpleNamespace(wvalues=tuple(-one))) for one in inside]
+    return float(hypervolume(front, reference) / reference.prod())
 
 
 def table(problem: Problem, results: Sequence[FrontResult]) -> Table:

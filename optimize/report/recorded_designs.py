@@ -31,8 +31,8 @@ PARTICLES_SHARE = 0.8
 class RecordedDesign:
     """A run of a design from its first start.
 
-    design : its index in the search. about : sentences about the run. facts, data : what a browser needs to
-        play it, see ``player_facts``.
+    design : its index in the search. about : sentences about the run. facts, data : the recording that a
+        browser plays, see ``player_facts``.
     """
 
     design: int

@@ -1,4 +1,5 @@
-"""The report of a finished search: a table like Z04's tables 1 to 3, and its convergence (Z04 figure 4)."""
+"""The report of a search: a table like Z04's tables 1 to 3, its convergence (Z04 figure 4), and a cell of a
+notebook with both."""
 
 from __future__ import annotations
 
@@ -15,14 +16,18 @@ from rich.table import Table
 from rich.text import Text
 
 from tisim.console import TERMINAL_WIDTH
+from tisim.errors import InputError, RunError
 from tisim.files import pictures
 from tisim.files.atomic import replace_file
+from tisim.notebook import CELL_DOTS_PER_INCH, card, card_picture, card_table
 from tisim.optimize.outcome import Outcome
 from tisim.optimize.tables import ERROR, FEASIBLE, HIGH, LOW, best_columns, met_columns, met_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+DESIGNS_IN_CELL = 5
+"""Largest number of designs in a cell of a notebook."""
 SHARP = 200
 """The resolution of figures for papers, dots per inch."""
 
@@ -218,3 +223,32 @@ def text(value: Any) -> str:
         return str(value)
     digits, power, exponent = f"{value:.4g}".partition("e")
     return f"{digits}e{int(exponent)}" if power else digits
+
+
+def outcome_cell(outcome: Outcome) -> str:
+    """Return the outcome of a search as HTML: its best designs in their units, and the convergence, or the
+    front of several objectives."""
+    problem, notes = outcome.problem, list[str]()
+    html = []
+    if outcome.hall:
+        html.append(card_table(*shown_designs(outcome, DESIGNS_IN_CELL)))
+        try:
+            with pictures.drawing("the search"):
+                from tisim.optimize.report.convergence import convergence_figure
+                from tisim.optimize.report.front import front_figure
+
+                draw = front_figure if problem.several else convergence_figure
+                text = "the front of the objectives" if problem.several else "the best value by generation"
+                html.append(card_picture(pictures.image(draw(outcome), dpi=CELL_DOTS_PER_INCH), text))
+        except (InputError, RunError) as failure:
+            notes.append(f"{failure}.")
+    if outcome.violated:
+        notes.append(f"No design satisfies the constraints; of the first one, {outcome.violated}.")
+    elif outcome.doubt:
+        notes.append(f"The {'compromise' if problem.several else 'first design'} {outcome.doubt}.")
+    if not outcome.hall and outcome.failures:
+        first = next(iter(outcome.failures.values()))[0]
+        notes.append(f"All designs failed; the first one: {first.reason}")
+    runs = f"{outcome.evaluations:,} runs" + (f", {outcome.hits:,} from the file" if outcome.hits else "")
+    ended = f"stopped by {outcome.stopped}" if outcome.stopped else "not finished"
+    return card(problem.title or problem.name, f"search: {runs}, {ended}", html, notes)

@@ -6,7 +6,6 @@ a share of the cores (see watch/budget.py).
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Mapping
@@ -19,15 +18,14 @@ from tisim.optimize.report.search_page import SearchPageOptions, search_html
 from tisim.optimize.search_folder import SEARCH_FILE
 from tisim.optimize.storage.cache import cache_files
 from tisim.watch.budget import Budget
-from tisim.watch.server import Replies, Reply
-from tisim.watch.waiting import POLL, UNREADABLE, waiting_page
+from tisim.watch.watched import POLL, UNREADABLE, Watched, waiting_page
 
 SCRIPT = "watch_search.js"
 PAGE_CREDIT = 0.1
 """Processor time in reserve, s: twice that of a page of 2,000 designs."""
 
 
-class WatchedSearch:
+class WatchedSearch(Watched):
     """The folder of a search that is watched; its ``answers`` are for a ``WatchServer``."""
 
     def __init__(
@@ -39,14 +37,6 @@ class WatchedSearch:
         self._lock = threading.Lock()
         self._made: tuple[str, str] = ("", "")
         self._ended = False
-
-    @property
-    def answers(self) -> Replies:
-        """Return the functions that answer requests: for the page, and for news since a version of it."""
-        return {
-            "": lambda query: Reply(self.page().encode(), "text/html"),
-            "news": lambda query: Reply(json.dumps(self.news(query)).encode(), "application/json"),
-        }
 
     def page(self) -> str:
         """Return the page; or one that waits for the search."""

@@ -185,3 +185,7 @@ def test_no_walls_and_particles_outside_are_refused():
     outside = [[0, 0, 0], [2.0, 0, 0]]
     with pytest.raises(InputError, match=r"particles\.position must be inside all walls of reflecting_walls"):
         simulate([scene(outside, np.zeros((2, 3)), (TUBE,), radius=A)])
+    held = scene(outside, np.zeros((2, 3)), (TUBE,), radius=A, quantities={"fixed": [0, 1]})
+    assert TUBE.check_start(held.start(), held) is None
+    with pytest.raises(InputError, match=r"cylinders\.0\.radius must be above the radius of the largest par"):
+        simulate([scene([[0, 0, 0]], np.zeros((1, 3)), (TUBE,), radius=HALF)])

@@ -24,7 +24,7 @@ from tisim.steppers import MechanicalContraction
 
 pytestmark = pytest.mark.long
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='hacked=1'>&amp;\u2028${title}"
-READ_PICKED = """() => {
+PICKED_PIXELS = """() => {
   const { viewer } = report.player, { gl } = viewer;
   viewer.draw(1);
   const { width, height, buffer } = viewer.image, pixels = new Uint32Array(width * height);
@@ -32,10 +32,15 @@ READ_PICKED = """() => {
   gl.readBuffer(gl.COLOR_ATTACHMENT1);
   gl.readPixels(0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, pixels);
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  const counts = {};
-  for (const one of pixels) counts[one] = (counts[one] ?? 0) + 1;
-  return { counts, metres: viewer.metresPerPixel() };
+  return pixels;
 }"""
+"""The row, plus one, of the particle at each pixel."""
+READ_PICKED = f"""() => {{
+  const pixels = ({PICKED_PIXELS})();
+  const counts = {{}};
+  for (const one of pixels) counts[one] = (counts[one] ?? 0) + 1;
+  return {{ counts, metres: report.player.viewer.metresPerPixel() }};
+}}"""
 """The number of pixels of each body, and the length of a pixel."""
 FOCUSED = (
     "(({ ariaLabel, labels, innerText }) => (ariaLabel || labels?.[0]?.innerText || innerText || '')"

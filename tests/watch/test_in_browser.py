@@ -5,28 +5,17 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from tests.report.test_in_browser import READ_PICKED, until
+from tests.report.test_in_browser import PICKED_PIXELS, READ_PICKED, until
 from tisim.engine.result import Status
 from tisim.io.reader import Frame
 from tisim.optimize.report import watched_search
 from tisim.report.page import static
 from tisim.watch import run as module
-from tisim.watch import waiting
+from tisim.watch import watched
 from tisim.watch.run import WatchedRun
 from tisim.watch.server import WatchServer
 
 pytestmark = pytest.mark.long
-PICKED_PIXELS = """() => {
-  const { viewer } = report.player, { gl } = viewer;
-  viewer.draw(1);
-  const { width, height, buffer } = viewer.image, pixels = new Uint32Array(width * height);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-  gl.readBuffer(gl.COLOR_ATTACHMENT1);
-  gl.readPixels(0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, pixels);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-  return pixels;
-}"""
-"""The row, plus one, of the particle at each pixel."""
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='hacked=1'>&amp;"
 
 
@@ -38,7 +27,7 @@ def watching(browser, tmp_path, monkeypatch, unlimited):
 
     @contextmanager
     def show(answers=None):
-        for one in (module, watched_search, waiting):
+        for one in (module, watched_search, watched):
             monkeypatch.setattr(one, "POLL", 0.2)
         with WatchServer(answers or WatchedRun(tmp_path, budget=unlimited).answers) as server:
             context = browser.new_context(viewport={"width": 1000, "height": 800})

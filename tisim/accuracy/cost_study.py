@@ -161,7 +161,7 @@ class Study(ShownInNotebook):
     complete : whether all settings are measured.
     """
 
-    shown_by = "tisim.accuracy.cell:study_cell"
+    shown_by = "tisim.accuracy.report:study_cell"
 
     def __init__(
         self,

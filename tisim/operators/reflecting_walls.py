@@ -74,11 +74,19 @@ class ReflectingWalls(Operator):
         return np.stack(within, axis=1)
 
     def check_start(self, start: Mapping[str, np.ndarray], scene: SceneParts) -> None:
-        if not len(start["radius"]):
-            return
-        outside = self.depths(start["position"]).max(axis=1)
-        place = start["position"][outside.argmax()].tolist()
-        must(outside.max() <= 0, "particles.position", f"inside all walls of {self.label}", place)
+        # Fixed particles are not reflected; those of an inlet wait anywhere.
+        free = start.get("fixed", np.zeros(len(start["radius"]))) == 0
+        largest = float(start["radius"].max(initial=0.0))
+        radii = {f"cylinders.{k}": one.radius for k, one in enumerate(self.cylinders)}
+        radii |= {f"spheres.{k}": one.radius for k, one in enumerate(self.spheres)}
+        for name, radius in radii.items():
+            rule = f"above the radius of the largest particle, {largest:g} m"
+            must(radius > largest, f"{self.label}.{name}.radius", rule, radius)
+        if free.any():
+            place = start["position"][free]
+            depth = self.depths(place).max(axis=1)
+            worst = place[depth.argmax()].tolist()
+            must(depth.max() <= 0, "particles.position", f"inside all walls of {self.label}", worst)
 
     @ti.func
     def particle(self, s, w, i, t, dt):

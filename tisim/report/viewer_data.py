@@ -74,7 +74,7 @@ def player_facts(
     network: ContactNetwork | None,
     lines: str | None = None,
 ) -> tuple[dict[str, object], bytes]:
-    """Return what a browser needs to play a run: plain data, and the compressed frames. lines : a field whose
+    """Return the recording that a browser plays: plain data, and the compressed frames. lines : a field whose
     lines in the last frame are shown, or None."""
     parts = [one.data for one in trajectory.columns] + ([network.data()] if network is not None else [])
     facts: dict[str, object] = {

@@ -8,7 +8,6 @@ asks for all.
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -29,8 +28,7 @@ from tisim.report.run_report import numbers, result_of, rounding, run_page, stat
 from tisim.report.viewer_data import ReportOptions, player_facts
 from tisim.scene.scene import Scene
 from tisim.watch.budget import Budget
-from tisim.watch.server import Replies, Reply
-from tisim.watch.waiting import POLL, UNREADABLE, waiting_page
+from tisim.watch.watched import POLL, UNREADABLE, Watched, waiting_page
 
 UPDATE_SECONDS = 0.05
 """Processor time of an update that is aimed at, s; it always has one frame."""
@@ -54,7 +52,7 @@ def _reached(sequence: Frames) -> str:
     return f"The run has come to t = {reached:.6g} s of {end:.6g} s."
 
 
-class WatchedRun:
+class WatchedRun(Watched):
     """The folder of a run that is watched, or one of its files.
 
     Its ``answers`` are for a ``WatchServer``. An unreadable file gives the last good state, and the reason.
@@ -80,14 +78,6 @@ class WatchedRun:
         if (file := self._file()) is not None:
             with frames(file, self._world):
                 pass
-
-    @property
-    def answers(self) -> Replies:
-        """Return the functions that answer requests: for the page, and for news since a frame."""
-        return {
-            "": lambda query: Reply(self.page().encode(), "text/html"),
-            "news": lambda query: Reply(json.dumps(self.news(query)).encode(), "application/json"),
-        }
 
     def page(self) -> str:
         """Return the page with all frames that exist, thinned to the limit; or one that waits for them."""
@@ -176,7 +166,7 @@ class WatchedRun:
         }  # fmt: skip
 
     def _new(self, sequence: Frames, opened: _Opened, result: Result | None, after: int) -> dict[str, Any]:
-        """Return the frames after one as plain data: as many as UPDATE_SECONDS allows, and the last."""
+        """Return new frames as plain data: the last one, and others before it as UPDATE_SECONDS allows."""
         count, particles = len(sequence), max(len(opened.first.arrays["id"]), 1)
         most = max(1, int(UPDATE_SECONDS / (self._rate * particles)))
         stride = -(-(count - 1 - after) // most)
