@@ -85,7 +85,7 @@ def cut_figure(valves: Sequence[ValveRuns]) -> Figure:
         cut(axis, valve.flows[0])
         axis.set_title(f"{valve.name}: {'arrested' if valve.flows[0].arrested else 'flows'}")
     letters(axes, 9)
-    label = "speed over that of the oil in the duct"
+    label = "speed / speed of the oil in the duct"
     figure.colorbar(ScalarMappable(SPEEDS, TIME), ax=axes, label=label, extend="both")
     return figure
 
