@@ -198,7 +198,7 @@ def table(searches, kinds):
             part, error = share_dominated(kind, searches, runs)
             way = f"a front, {runs} runs"
             print(f"{kind:40s} {way:26s} truly dominated {part:.3f} +- {1.96 * error:.3f}", flush=True)
-        for above in (-1e-9, 0.1):
+        for above in (-1e-9, 0.1, 0.2):
             stopped, wrong = stopped_at_target(kind, searches, above)
             print(
                 f"{kind:40s} target {above:+.1f}: {stopped:.3f} stop, {wrong:.3f} of these in error",
