@@ -85,7 +85,10 @@ def test_the_page_has_every_setting(study, tmp_path):
 def test_wrong_input_is_refused(tisim, study, tmp_path):  # noqa: F811
     assert tisim("report", study, "--to", "p/c.html") == (0, "p/c.html\n", "")
     for arguments, message in (
-        (("--designs", 2), f"options must be for a study of costs, as {study} is one; received '--designs'"),
+        (
+            ("--designs", 2),
+            f"options must be for the page of a study of costs, as {study} holds one; received '--designs'",
+        ),
         (("--limit", 0.01), "limit must be at least the size of the page, 0."),
     ):
         code, _, err = tisim("report", study, *arguments)

@@ -275,6 +275,7 @@ def trajectory_file(path: Path) -> Path:
         if regular_file.exists(path / name):
             pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
             raise InputError(
-                f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
+                f"folder must be the folder of a run; received the folder of {what}, with the pictures: "
+                f"{pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")

@@ -48,7 +48,7 @@ def watch(
     from tisim.watch.server import WatchServer
 
     exists = regular_file.is_folder(folder) or regular_file.exists(folder)
-    must(exists, "folder to watch", "an existing one", str(folder))
+    must(exists, "folder to watch", "an existing folder or file", str(folder))
     with WatchServer(_answers(folder, world), port) as server, _link(server.address) as link:
         print(server.address, flush=True)
         say("watching until Ctrl-C")
@@ -72,7 +72,12 @@ def _answers(path: Path, world: int) -> Replies:
     from tisim.watch.run import WatchedRun
 
     of_costs = regular_file.is_folder(path) and regular_file.exists(path / "cost.h5")
-    must(not of_costs, "folder to watch", "one of a run or a search", Words(f"{path}, of a study of costs"))
+    must(
+        not of_costs,
+        "folder to watch",
+        "the folder of a run or a search",
+        Words(f"{path}, of a study of costs"),
+    )
     run = WatchedRun(path, world)
     run.check()
     return run.answers
