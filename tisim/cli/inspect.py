@@ -86,8 +86,8 @@ def plot(
 ) -> None:
     """Draw pictures of a run.
 
-    They show the cloud, the time series of energy, centre of gravity and number of particles, the forces on
-    walls and driven groups, and more if the run is of a case. The options are for the cloud.
+    They show the particles, the time series of energy, centre of gravity and number of particles, the forces
+    on walls and driven groups, and more if the run is of a case. The options are for the particles.
     """
     from tisim.io.reader import frames
 

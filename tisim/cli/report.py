@@ -94,7 +94,7 @@ def report(
     designs: Annotated[
         int,
         typer.Option(
-            min=0, max=100, help="Of a search: run this number of its best designs, to show their clouds."
+            min=0, max=100, help="Of a search: run this number of its best designs, to show their particles."
         ),
     ] = 0,
     problem: Annotated[
