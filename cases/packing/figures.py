@@ -60,11 +60,11 @@ def starts_of(study: Study, size: str) -> int:
 
 
 def drawn(made: Mapping[Study, list[Packing]]) -> dict[str, Figure]:
-    """Return the figures of studies; rods in a periodic box are always among them."""
+    """Return the figures of studies; those of cylinders and wedges need rods in a periodic box, too."""
     # Packings end in any order.
     made = {study: sorted(some, key=lambda one: one[0].place()) for study, some in made.items()}
     rows = {study: [row for row, _ in some] for study, some in made.items()}
-    free = rows["aspect ratio"]
+    free = rows.get("aspect ratio", [])
     curves_of: Mapping[str, tuple[Study, Callable[[list[PackedRow]], Figure]]] = {
         "rods.png": ("aspect ratio", lambda some: curves.of_rods([*some, *rows.get("long rods", [])])),
         "inertia.png": ("moment of inertia", curves.of_inertia),
