@@ -121,7 +121,7 @@ EFFECTS = {
     "passage": f"Passage({PLATE})",
     "peak_displacement": f"{CONTACT}, PeakDisplacement()",
     "peak_height": "Gravity(), PeakHeight(direction=(1.0, 0.0, 0.0))",
-    "reflecting_walls": f"Gravity(), ReflectingWalls({PLATE})",
+    "reflecting_walls": "Gravity(), ReflectingWalls(planes=[Plane(point=(0, 0, -1e-3), normal=(0, 0, 1))])",
     "permanent_moment": f"{FIELD}, PermanentMoment(magnetisation=1e5), Magnetophoresis()",
     "constant_damping": "Granular(normal=Hooke(), damping=ConstantDamping())",
     "dmt": "Granular(normal=HertzMaterial(), damping=RestitutionDamping(), cohesion=DMT())",
