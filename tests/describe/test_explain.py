@@ -44,6 +44,13 @@ def flow():
 
 
 @cache
+def explained_bare():
+    """Without any effect."""
+    made = agglomeration(BEST, 1, grains=60)
+    return explain(made.without(*(effect.kind() for effect in made.effects)))
+
+
+@cache
 def explained_pair():
     return explain(pair(SHELL))
 
@@ -84,8 +91,7 @@ def test_absent_effects_and_fields():
 
 
 def test_without_any_effect_nothing_of_effects_is_compiled():
-    whole = agglomeration(BEST, 1, grains=60)
-    explanation = explain(whole.without(*(effect.kind() for effect in whole.effects)))
+    explanation = explained_bare()
     assert explanation.effects == ()
     assert {
         item.why for item in explanation.memory if item.bytes and not item.name.endswith(("table", "list"))
@@ -278,8 +284,7 @@ def test_parts_of_a_law_and_pairs_of_materials():
     assert mixed["E*"][0] == pytest.approx(expected, rel=1e-5)
     # A property that one of the materials lacks is not listed for the pair.
     assert "stiffness" not in mixed
-    bare = agglomeration(BEST, 1, grains=60)
-    explanation = explain(bare.without(*(effect.kind() for effect in bare.effects)))
+    explanation = explained_bare()
     assert explanation.materials == ()
     output = text(replace(explanation, effects=(granular,), materials=parts))
     assert "rolling_friction = 0.141421" in output
