@@ -81,13 +81,15 @@ def check_result(result: Result) -> None:
     """Check that a result is finite, and that a failure states the time, and a particle, a force or a
     capacity.
 
-    A start that fails is returned unchanged; quantities derived from it, such as forces, need not be finite.
+    A start that fails is returned unchanged; quantities derived from it, such as forces and the virial, need
+    not be finite.
     """
     if result.measures:
         assert result.measures.keys() == measured(result.scene.effects).keys()
     begun = result.status.ok or result.time > 0
     reported = {name: values for name, values in result.state.items() if begun or name in result.start}
-    for name, values in {**reported, **result.measures, "time": result.time}.items():
+    measures = result.measures if begun else {}
+    for name, values in {**reported, **measures, "time": result.time}.items():
         assert np.isfinite(values).all(), f"{name} is not finite, and the status is {result.status}"
     if result.status.ok or result.status.reason == REASONS[WorldStatus.RUNNING]:
         return

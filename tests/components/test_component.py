@@ -120,6 +120,22 @@ class SampleList(Component):
     rows: tuple[SampleRow, ...]
 
 
+class SampleFilledList(Component):
+    """A component with a list of at least one row."""
+
+    rows: tuple[SampleRow, ...] = option("rows", min_length=1)
+
+
+def test_a_wrong_row_does_not_make_its_list_too_short():
+    for given, message in (
+        ([{"radius": -1}], "sample_filled_list.rows.0.radius must be greater than 0.0; received -1"),
+        ([], "sample_filled_list.rows must be a list of 1; received []"),
+    ):
+        with pytest.raises(InputError) as fault:
+            SampleFilledList(rows=given)
+        assert str(fault.value) == message
+
+
 def test_a_list_of_rows_varies_in_number_too():
     """Up to a capacity, the number of rows is no structure; messages say which row is wrong."""
     few, many = ([SampleRow(radius=1)] * n for n in (0, SampleRow.least_rows))

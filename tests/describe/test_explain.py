@@ -3,6 +3,7 @@
 import io
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,30 @@ pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
 
 
+@cache
+def flow():
+    """The flow of grains that agglomerate, and its explanation, which compiles it."""
+    made = agglomeration(BEST, 1, grains=60)
+    return made, explain(made)
+
+
+@cache
+def explained_bare():
+    """Without any effect."""
+    made = agglomeration(BEST, 1, grains=60)
+    return explain(made.without(*(effect.kind() for effect in made.effects)))
+
+
+@cache
+def explained_pair():
+    return explain(pair(SHELL))
+
+
+@cache
+def explained_cloud():
+    return explain(vibration(sites=2))
+
+
 def text(explanation):
     stream = io.StringIO()
     Console(file=stream, width=150).print(render(explanation))
@@ -42,14 +67,13 @@ def text(explanation):
 
 
 def test_every_effect_of_the_flow_is_listed():
-    flow = agglomeration(BEST, 1, grains=60)
-    explanation = explain(flow)
-    assert [part.name for part in explanation.effects] == [effect.kind() for effect in flow.effects]
+    made, explanation = flow()
+    assert [part.name for part in explanation.effects] == [effect.kind() for effect in made.effects]
     assert all(part.summary and part.source for part in explanation.effects)
     names = {part.name for part in explanation.effects}
     assert {part.name for part in explanation.absent_effects} == {k.kind() for k in known_effects()} - names
     assert (explanation.particles, explanation.capacity) == (60, 60)
-    assert explanation.steps == pytest.approx(flow.duration / flow.stepper.control.longest)
+    assert explanation.steps == pytest.approx(made.duration / made.stepper.control.longest)
 
 
 def test_absent_effects_and_fields():
@@ -67,8 +91,7 @@ def test_absent_effects_and_fields():
 
 
 def test_without_any_effect_nothing_of_effects_is_compiled():
-    whole = agglomeration(BEST, 1, grains=60)
-    explanation = explain(whole.without(*(effect.kind() for effect in whole.effects)))
+    explanation = explained_bare()
     assert explanation.effects == ()
     assert {
         item.why for item in explanation.memory if item.bytes and not item.name.endswith(("table", "list"))
@@ -78,12 +101,12 @@ def test_without_any_effect_nothing_of_effects_is_compiled():
 
 @pytest.mark.slow
 def test_memory_equals_the_allocated_memory():
-    flow = agglomeration(BEST, 1, grains=60)
-    simulation = Simulation(flow)
-    sizes = {item.name: item.bytes for item in explain(flow).memory}
+    made, explanation = flow()
+    simulation = Simulation(made)
+    sizes = {item.name: item.bytes for item in explanation.memory}
     assert {name: sizes[name] for name in simulation.s.bytes()} == simulation.s.bytes()
     assert sizes["position"] == 3 * sizes["radius"]
-    assert explain(flow).phases == tuple(simulation.program.names())
+    assert explanation.phases == tuple(simulation.program.names())
     simulation.close()
 
 
@@ -146,7 +169,7 @@ def test_the_brief_form_of_every_case_fits_a_screen(name):
 
 
 def test_the_brief_form_has_values_memory_and_a_number_of_absent_effects_by_family():
-    explanation = explain(agglomeration(BEST, 1, grains=60))
+    _, explanation = flow()
     output = short(explanation)
     assert "hardness = 265480 Pa" in output
     assert "heat_capacity = 1796.3 J/(kg K)" in output
@@ -157,7 +180,7 @@ def test_the_brief_form_has_values_memory_and_a_number_of_absent_effects_by_fami
     assert "convection" not in rows["cooling"]
     assert "RebuildNearList* > ClearContacts > FindContacts > Rounds* >" in " ".join(output.split())
     assert "SearchRows" not in output
-    assert "(0, 0, 0)" not in short(explain(vibration(sites=2)))
+    assert "(0, 0, 0)" not in short(explained_cloud())
     named = " ".join(output.split("Left out")[1].split("Cost")[0].split())
     counted = {name: int(number) for name, number in (item.split() for item in named.split(", "))}
     magnetic = [kind for kind in known_effects() if ".magnetic." in kind.__module__]
@@ -168,7 +191,7 @@ def test_the_brief_form_has_values_memory_and_a_number_of_absent_effects_by_fami
 
 
 def test_the_memory_of_the_brief_form_adds_up():
-    explanation = explain(agglomeration(BEST, 1, grains=60))
+    _, explanation = flow()
     units = {"bytes": 1, "kB": 1e3}
     found = re.findall(r"([\d.]+)\s+(bytes|kB)\b", short(explanation))
     total, *parts = [float(number) * units[unit] for number, unit in found]
@@ -180,7 +203,7 @@ def test_the_memory_of_the_brief_form_adds_up():
 def test_a_law_is_shown_with_its_parts_and_long_values_are_cut():
     law = Granular(tangential=MindlinForce(), rolling=RollingEPSD(damping_ratio=0.2))
     walls = Walls(planes=[Plane(point=(0.1 * k, 0.0, 0.0)) for k in range(3)])
-    empty = explain(pair(SHELL))
+    empty = explained_pair()
     rubber, steel = (Material(young=2e8 * k, poisson=0.3, friction=0.1 * k) for k in (1, 2))
     table = {"rubber-steel": MaterialPair(friction=0.7)}
     materials = tuple(explained_materials(Materials({"rubber": rubber, "steel": steel}, table)))
@@ -201,19 +224,20 @@ def test_the_cost_of_absent_effects_is_the_same_in_the_program_and_in_the_docume
         assert COST_OF_ABSENT in words, page
     record = (ROOT / "docs/measurements/compiling.md").read_text(encoding="utf-8")
     assert COST_OF_ABSENT.replace("to", "..") in record
-    assert COST_OF_ABSENT in short(explain(pair(SHELL)))
+    assert COST_OF_ABSENT in short(explained_pair())
 
 
+@in_taichi_thread
 def test_the_bytes_of_effects_that_are_present_are_as_documented():
     """The fields of the case agglomeration over those of its impacts and agglomeration alone."""
     whole = agglomeration(BEST, 1, grains=60)
     alone = whole.without(*(e.kind() for e in whole.effects if e.kind() not in ("impact", "agglomeration")))
     sizes = []
     for one in (whole, alone):
-        simulation = Simulation(one)
-        sizes.append(sum(simulation.s.bytes().values()) / 60)
-        simulation.s.read("count")
-        simulation.close()
+        with memory.collected() as trees:
+            sizes.append(sum(Allocation(one, 1, 60).s.bytes().values()) / 60)
+        for tree in trees:
+            tree.destroy()
     ratio, (many, few) = f"{sizes[0] / sizes[1]:.2f} times", map(int, sizes)
     readme, page = (
         " ".join((ROOT / file).read_text(encoding="utf-8").split())
@@ -224,7 +248,7 @@ def test_the_bytes_of_effects_that_are_present_are_as_documented():
 
 
 def test_parameters_have_units_and_sources():
-    output = text(explain(agglomeration(BEST, 1, grains=60)))
+    output = text(flow()[1])
     assert "hardness = 265480 Pa" in output
     assert "heat_capacity = 1796.3 J/(kg K)" in output
     assert "Z04 Eq. (6.9)" in output
@@ -260,8 +284,7 @@ def test_parts_of_a_law_and_pairs_of_materials():
     assert mixed["E*"][0] == pytest.approx(expected, rel=1e-5)
     # A property that one of the materials lacks is not listed for the pair.
     assert "stiffness" not in mixed
-    bare = agglomeration(BEST, 1, grains=60)
-    explanation = explain(bare.without(*(effect.kind() for effect in bare.effects)))
+    explanation = explained_bare()
     assert explanation.materials == ()
     output = text(replace(explanation, effects=(granular,), materials=parts))
     assert "rolling_friction = 0.141421" in output
@@ -270,7 +293,7 @@ def test_parts_of_a_law_and_pairs_of_materials():
 
 def test_a_vibrating_cloud_has_no_contact_spin_or_temperature():
     """Z13: only forces on charges; no fields, lists or phases of anything else."""
-    explanation = explain(vibration(sites=2))
+    explanation = explained_cloud()
     effects = {"lorentz", "electric_field", "magnetic_field", "tether", "near_field"}
     assert {part.name for part in explanation.effects} == effects
     absent = {part.name for part in explanation.absent_effects}

@@ -213,6 +213,27 @@ def tethered(**more):
     )
 
 
+def beside_a_wall(distance, stiffness, away, dt, duration, **more):
+    """Return a scene of a grain on a spring, in front of a wall that moves.
+
+    distance : of the centre from the wall (m). stiffness : of the spring (N/m). away : velocity of the wall
+    (m/s). dt, duration : s.
+    """
+    return tisim.Scene(
+        particles=tisim.Particles(
+            position=[(distance, 0, 0)], velocity=[more.pop("velocity")], radius=1e-3, **more
+        ),
+        materials={"grain": tisim.Material(stiffness=1e3, restitution=0.3)},
+        effects=(
+            laws.Granular(normal=laws.Hooke(), damping=laws.RestitutionDamping()),
+            laws.Walls(planes=[Plane(normal=(1, 0, 0))], motion=laws.Translation(velocity=(away, 0, 0))),
+            laws.Tether(stiffness=(stiffness,) * 3),
+        ),
+        stepper=Verlet(control=FixedStep(dt=dt)),
+        duration=duration,
+    )
+
+
 class TestTheGuard:
     """A fixed step beyond the critical step stops the world, under every law."""
 
@@ -273,38 +294,14 @@ class TestTheGuard:
     def test_an_instability_beside_contacts_stops_the_world(self, factor, ok):
         """Contact laws guard their own steps, but not the steps of a spring beside them."""
         dt = factor * 2 / (2 * np.pi * 1e3)
-        scene = tisim.Scene(
-            particles=tisim.Particles(
-                position=[(0, 0, 0), (1, 0, 0)], velocity=[(0.1, 0, 0), (0, 0, 0)], radius=1e-3, mass=1e-6
-            ),
-            materials={"grain": tisim.Material(young=1e3, poisson=0.25)},
-            effects=(laws.Tether(stiffness=(4 * np.pi**2,) * 3), laws.Granular()),
-            stepper=Verlet(control=FixedStep(dt=dt)),
-            duration=0.1,
-        )
-        result = tisim.run(scene)
+        result = tisim.run(beside_a_wall(0.1, 4 * np.pi**2, -0.1, dt, 0.1, mass=1e-6, velocity=(0.1, 0, 0)))
         assert result.status.ok == ok, result.status.reason
         assert ok or "effects.tether" in result.status.reason
 
     def test_a_wall_pulled_away_does_not_stop_the_world(self):
         """The dashpot of the wall pulls at a grain in the first step only, which is not an instability."""
-        radius, mass = 1e-3, 1e-5
-        scene = tisim.Scene(
-            particles=tisim.Particles(
-                position=[(radius - 1e-6, 0, 0)], velocity=[(0, 0, 0)], radius=radius, mass=mass
-            ),
-            materials={
-                "grain": tisim.Material(stiffness=1e3, restitution=0.3),
-            },
-            effects=(
-                laws.Granular(normal=laws.Hooke(), damping=laws.RestitutionDamping()),
-                laws.Walls(planes=[Plane(normal=(1, 0, 0))], motion=laws.Translation(velocity=(-50.0, 0, 0))),
-                laws.Tether(stiffness=(1e-3,) * 3),
-            ),
-            stepper=Verlet(control=FixedStep(dt=1e-5)),
-            duration=1e-3,
-        )
-        assert tisim.run(scene).check().state["velocity"][0, 0] < -1e-2
+        result = tisim.run(beside_a_wall(1e-3 - 1e-6, 1e-3, -50.0, 1e-5, 1e-3, mass=1e-5, velocity=(0, 0, 0)))
+        assert result.check().state["velocity"][0, 0] < -1e-2
 
     def test_verlet_is_refused_beside_a_magnetic_force(self):
         with pytest.raises(tisim.InputError, match=r"stepper must be one that turns velocities"):

@@ -159,6 +159,18 @@ def test_kernels_know_each_shape_as_a_rod_or_a_superquadric():
             {"semi_axes": (1, 1, 1), "exponents": (2, 2, 21)},
             r"superquadric_shape.exponents must be three numbers from 2 to 20; received \(2.0, 2.0, 21.0\)",
         ),
+        *(
+            (
+                shape,
+                settings,
+                f"^the thickness of {shape.kind()} must be at least 1e-07 of the diameter of its",
+            )
+            for shape, settings in (
+                (SpherocylinderShape, {"length": 1e100, "diameter": 1e-3}),
+                (EllipsoidShape, {"semi_axes": (1e-3, 1e-3, 2e4)}),
+                (SuperquadricShape, {"semi_axes": (1e100, 1e-3, 1e-3), "exponents": (4, 2, 3)}),
+            )
+        ),
     ],
 )
 def test_shapes_without_a_strictly_convex_body_are_refused(shape, settings, message):

@@ -68,6 +68,9 @@ def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, F
             for line in _named_within(name, loc, str(context["error"])):
                 lines.setdefault(line, [])
             continue
+        if fault["type"] == "too_short" and len(fault["input"]) >= context["min_length"]:
+            # Pydantic counts the valid members only; the others have messages of their own.
+            continue
         nearest = ""
         rule = _RULES[fault["type"]].format(**context) if fault["type"] in _RULES else ""
         rule = rule or fault["msg"].removeprefix("Input should be ")

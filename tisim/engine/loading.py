@@ -49,14 +49,15 @@ def check_start(fields: Sequence[Field], scene: Scene, start: Arrays) -> None:
     if missing:
         names = ", ".join(sorted(missing))
         raise InputError(f"particles must be given {names}, which effects of the scene need; received none")
-    if n and any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects):
-        scene.stepper.control.check_start(start)
     if "fixed" in start and start["fixed"].shape == (n,):
         rest = not np.any(start["velocity"][start["fixed"] != 0])
         must(rest, "particles.velocity", "0 for fixed particles", Words("one that moves"))
     for f in {**SHARED, **{f.name: f for f in fields}}.values():
         if f.name in start:
             check_field(f, start[f.name], n)
+    if n:
+        hard = any(isinstance(effect, PairEvent) and effect.hard for effect in scene.effects)
+        scene.stepper.control.check_start(start, hard, scene.stepper.independent(scene.effects))
     check_held(scene, start)
     check_rounding(scene)
     for effect in scene.acting():

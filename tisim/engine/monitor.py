@@ -218,18 +218,17 @@ class Monitor:
                 where += f"; the step is {then['dt'][w]:.4g} s, and the force is finite up to {longest:.3g} s"
         return f"{reason}{where}" if who == NO_ONE else f"{reason}, at particle {who}{where}"
 
+    @np.errstate(over="ignore")
     def _outrun(self, w: int, then: Image) -> str:
         """Name the particle of a world that moves too far in a step, and the step below which it does not."""
         n, dt = int(then["count"][w]), float(then["dt"][w])
-        # The square of a speed above 1e154 m/s overflows, so the largest component is used.
-        speed = np.abs(then["velocity"][w, :n] - then["frame"][w]).max(axis=1)
-        if speed.max() < 1e150:
-            speed = np.linalg.norm(then["velocity"][w, :n] - then["frame"][w], axis=1)
+        # The squares of large speeds and spins overflow, but not their norms.
+        speed = np.hypot.reduce(then["velocity"][w, :n] - then["frame"][w], axis=1)
         smallest, what = float(then["radius"][w, :n].min()), "radius"
         for one in self.simulation.scenes[w].effects:
             if isinstance(one, Shaped):
                 # Points of a body may move by its rotation, and it is thinner than the sphere around it.
-                speed = speed + np.linalg.norm(then["spin"][w, :n], axis=1) * then["radius"][w, :n]
+                speed = speed + np.hypot.reduce(then["spin"][w, :n], axis=1) * then["radius"][w, :n]
                 smallest, what = smallest * one.derived_rows()["slenderness"][0], "half extent"
         who = int(np.argmax(speed))
         moved = f"particle {then['id'][w][who]} moves by {speed[who] * dt:.3g} m relative to the others"

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import model_validator
 
 from tisim.components.component import Vector, parameter
-from tisim.shapes.particle_shape import ParticleShape, positive
+from tisim.shapes.particle_shape import ParticleShape, check_thickness, positive
 
 
 class EllipsoidShape(ParticleShape):
@@ -25,6 +25,7 @@ class EllipsoidShape(ParticleShape):
     @model_validator(mode="after")
     def _axes_are_positive(self) -> Self:
         positive(f"{self.label}.semi_axes", self.semi_axes)
+        check_thickness(self)
         return self
 
     def volume(self) -> float:

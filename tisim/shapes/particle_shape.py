@@ -11,6 +11,9 @@ from tisim.components.component import Component, Vector
 from tisim.components.ranges import LEAST, MOST
 from tisim.errors import must
 
+THINNEST = 1e-7
+"""Smallest thickness of a shape over the diameter of its bounding sphere; a thinner one is lost to rounding
+in single precision."""
 BISECTIONS = 60
 """Bisections along a ray, after which its end is on the surface to rounding."""
 
@@ -89,6 +92,13 @@ class ParticleShape(Component):
             inside, outside = np.where(within, middle, inside), np.where(within, outside, middle)
         points: np.ndarray = inside[:, None] * ray
         return points
+
+
+def check_thickness(shape: ParticleShape) -> None:
+    """Raise InputError if a shape is too thin for its length."""
+    half, radius = shape.half_extents().min(), shape.bounding_radius()
+    rule = f"at least {THINNEST:g} of the diameter of its bounding sphere, {2 * radius:.3g} m"
+    must(bool(half >= THINNEST * radius), f"the thickness of {shape.label}", rule, float(2 * half))
 
 
 def positive(name: str, values: Vector) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
+from pydantic import model_validator
 
 from tisim.components.component import parameter
-from tisim.shapes.particle_shape import ParticleShape
+from tisim.shapes.particle_shape import ParticleShape, check_thickness
 
 
 class SpherocylinderShape(ParticleShape):
@@ -22,6 +25,11 @@ class SpherocylinderShape(ParticleShape):
 
     length: float = parameter("m", "length L of the cylinder, without its hemispheres", examples=[4e-3], ge=0)
     diameter: float = parameter("m", "diameter D", examples=[1e-3], gt=0)
+
+    @model_validator(mode="after")
+    def _is_not_too_thin(self) -> Self:
+        check_thickness(self)
+        return self
 
     @property
     def radius(self) -> float:

@@ -10,7 +10,7 @@ from scipy.special import gamma, logsumexp
 
 from tisim.components.component import Vector, parameter
 from tisim.errors import must
-from tisim.shapes.particle_shape import ParticleShape, positive
+from tisim.shapes.particle_shape import ParticleShape, check_thickness, positive
 
 SHARPEST_EXPONENT = 20.0
 """Up to this exponent the narrow phase is tested; a superball of exponent 20 fills 97 % of its cube."""
@@ -43,6 +43,7 @@ class SuperquadricShape(ParticleShape):
         allowed = all(2 <= one <= SHARPEST_EXPONENT for one in self.exponents)
         rule = f"three numbers from 2 to {SHARPEST_EXPONENT:g}"
         must(allowed, f"{self.label}.exponents", rule, self.exponents)
+        check_thickness(self)
         return self
 
     def volume(self) -> float:

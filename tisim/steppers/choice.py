@@ -77,7 +77,7 @@ def choose(
         must(not len(largest_inserted([effect])["radius"]), "scene.stepper", rule, Words("none"))
     forces = [effect for effect in effects if isinstance(effect, Force | PairForce)]
     speed = meeting_speed(effects, domain, start, duration)
-    steps = {effect.label: effect.critical_step(start, speed, effects) for effect in effects}
+    steps = told_steps(effects, start, speed)
     critical = finite_steps(steps)
     needed = [effect for effect in effects if effect.leapfrog]
     if not (forces or needed) or any(isinstance(effect, PairEvent) for effect in effects):
@@ -87,7 +87,7 @@ def choose(
     if needed or domain.shears() or (contacts and told):
         why = (needed or contacts or [domain])[0].label
         return _leapfrog(effects, why, critical, steps, duration, accuracy)
-    return _error_controlled(effects, domain, start, critical, duration, accuracy)
+    return _error_controlled(effects, domain, start, speed, critical, duration, accuracy)
 
 
 def critical_steps(
@@ -95,7 +95,26 @@ def critical_steps(
 ) -> dict[str, float]:
     """Return the critical time steps (s) of the effects that have one, by label, the shortest first."""
     speed = meeting_speed(effects, domain, start, duration)
-    return finite_steps({effect.label: effect.critical_step(start, speed, effects) for effect in effects})
+    return finite_steps(told_steps(effects, start, speed))
+
+
+def told_steps(
+    effects: Sequence[Effect], start: Mapping[str, np.ndarray], speed: float
+) -> dict[str, float | None]:
+    """Return the critical time step (s) of each effect by label; None if it is unknown, or if its arithmetic
+    overflows or gives less than the shortest step.
+
+    speed : m/s, at which particles meet.
+    """
+    steps: dict[str, float | None] = {}
+    with np.errstate(all="ignore"):
+        for effect in effects:
+            try:
+                step = effect.critical_step(start, speed, effects)
+            except ArithmeticError:
+                step = None
+            steps[effect.label] = step if step is not None and step >= SHORTEST_STEP else None
+    return steps
 
 
 def finite_steps(steps: Mapping[str, float | None]) -> dict[str, float]:
@@ -104,6 +123,7 @@ def finite_steps(steps: Mapping[str, float | None]) -> dict[str, float]:
     return dict(sorted(known.items(), key=lambda item: item[1]))
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def meeting_speed(
     effects: Sequence[Effect], domain: Domain, start: Mapping[str, np.ndarray], duration: float
 ) -> float:
@@ -198,6 +218,7 @@ def _error_controlled(
     effects: Sequence[Effect],
     domain: Domain,
     start: Mapping[str, np.ndarray],
+    speed: float,
     critical: Mapping[str, float],
     duration: float,
     accuracy: float,
@@ -205,11 +226,14 @@ def _error_controlled(
     pairwise, kinked = any(isinstance(effect, PairForce) for effect in effects), kinks(effects, domain)
     # Operators act, and observers sample, once per step.
     sampled = any(isinstance(effect, Operator) for effect in effects)
+    stride = _stride(effects, start)
+    # The shortest step is so short that the fastest particle moves by less than a stride in it.
+    within = 0.5 * stride / speed if stride > 0 and speed > 0 else math.inf
     limits = {
         "first": _length(min(1e-6, 1e-4 * duration)),
         "longest": _length(0.1 * duration * (accuracy if sampled else 1.0)),
-        "shortest": max(SHORTEST_STEP, min(1e-12, 1e-10 * duration)),
-        "stride": _stride(effects, start),
+        "shortest": max(SHORTEST_STEP, min(1e-12, 1e-10 * duration, within)),
+        "stride": stride,
         "resolution": RESOLUTION,
     }
     smooth = TOGETHER if pairwise else ALONE

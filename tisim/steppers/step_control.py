@@ -71,9 +71,12 @@ class StepControl(Component):
         """Return the relative errors requested of steps, by the names of the settings; by default none."""
         return {}
 
-    def check_start(self, start: Mapping[str, np.ndarray]) -> None:
-        """Raise InputError if the steps are too long for an initial state, by field name, of hard particles
-        that collide; by default they are not."""
+    def check_start(self, start: Mapping[str, np.ndarray], hard: bool, independent: bool) -> None:
+        """Raise InputError if the limits of a step do not suit an initial state, by field name; by default
+        they do.
+
+        hard : whether the particles collide as hard ones. independent : whether each takes its own steps.
+        """
 
 
 class Controller(StepControl):
@@ -139,7 +142,9 @@ class ApproachTime(Controller):
     def min_steps(self, duration: float) -> float:
         return duration / self.longest
 
-    def check_start(self, start: Mapping[str, np.ndarray]) -> None:
+    def check_start(self, start: Mapping[str, np.ndarray], hard: bool, independent: bool) -> None:
+        if not hard:
+            return
         radius, velocity = start["radius"], start["velocity"]
         # Two particles that meet head on, and move by a radius each in one step, have passed each other: no
         # impact is detected.

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation as Turn
 from tests.scenes import compiled, fixed, simulate
 from tisim import Box, Clump, GrainClass, InputError, Material, Particles, Scene
 from tisim.analysis import clump_bodies
+from tisim.domains.domain import Open
 from tisim.effects import (
     DMT,
     Granular,
@@ -22,7 +23,7 @@ from tisim.effects import (
     Tether,
     Walls,
 )
-from tisim.effects.constraint.clump_fields import longest_clump
+from tisim.effects.constraint.clump_fields import check_clumps, longest_clump
 from tisim.geometry import Plane
 from tisim.operators import InsertionByFlux
 from tisim.packing import EqualSizes
@@ -416,6 +417,22 @@ def test_invalid_scenes_are_refused(why):
     wrong, message = REFUSED[why]
     with pytest.raises(InputError, match=message):
         clumps(PEAR, [(0, 0, 0)], **wrong)
+
+
+def test_angular_momenta_beyond_finite_velocities_are_refused():
+    """The squares of the velocities overflow for the first, and the velocities for the second."""
+    start = clumps(PEAR, [(0, 0, 0)]).start()
+    for size, message in (
+        (1e155, r"^particles\.velocity must be those of their clumps"),
+        (
+            1.7e308,
+            r"^particles\.clump_angular_momentum must be so small that .* are finite; received 1\.7e\+308",
+        ),
+    ):
+        momentum = start["clump_angular_momentum"].copy()
+        momentum[0, 0] = size
+        with pytest.raises(InputError, match=message):
+            check_clumps({**start, "clump_angular_momentum": momentum}, Open())
 
 
 @pytest.mark.long

@@ -58,6 +58,8 @@ LAW = Granular(
 USUAL = {"young": 1e7, "poisson": 0.3, "restitution": 0.7, "friction": 0.5, "rolling_friction": 0.1}
 TURNS = Rotation.from_rotvec([[1.2, 0.1, 0.2], [0.3, 0.2, 0.9]]).as_quat(scalar_first=True)
 WEIGHT = Gravity(acceleration=(0, 0, -9.81))
+WEIGHTLESS = Gravity(acceleration=(0, 0, 0))
+"""For bodies without weight in a compiled scene of bodies with weight."""
 FLOOR = Walls(planes=[Plane(normal=(0, 0, 1))])
 
 
@@ -103,8 +105,8 @@ def test_a_free_top_keeps_its_angular_momentum_and_turns_to_second_order(shape):
         w = r.apply(r.inv().apply(momentum_) / moments)
         return 0.5 * np.array([-w @ q[1:], *(q[0] * w + np.cross(w, q[1:]))])
 
-    q, h = np.array(TURNS[0]), time / 4000
-    for _ in range(4000):
+    q, h = np.array(TURNS[0]), time / 1000
+    for _ in range(1000):
         k1 = rate(q)
         k2 = rate(q + h / 2 * k1)
         k3 = rate(q + h / 2 * k2)
@@ -241,10 +243,10 @@ def test_restitution_holds_wherever_a_body_hits_a_floor(name):
 def test_a_rod_hits_another_head_on_with_the_restitution_of_the_material():
     """End to end and across, at the centres, where nothing turns."""
     for turn, apart in ((LYING, 5 * D), ((1.0, 0, 0, 0), D)):
-        law, place = Granular(damping=RestitutionDamping()), [(-0.51 * apart, 0, 0), (0.51 * apart, 0, 0)]
+        place = [(-0.51 * apart, 0, 0), (0.51 * apart, 0, 0)]
         made = moving(
-            ROD, place, (law,), 1e-7, 15_000, velocity=[(0.2, 0, 0), (-0.2, 0, 0)], orientation=[turn, turn],
-            materials=material(),
+            ROD, place, (LAW, WEIGHTLESS), 1e-7, 15_000, velocity=[(0.2, 0, 0), (-0.2, 0, 0)],
+            orientation=[turn, turn], materials=material(),
         )  # fmt: skip
         (result,) = simulate([made])
         np.testing.assert_allclose(result.state["velocity"][:, 0], [-0.14, 0.14], rtol=0.01)
@@ -454,7 +456,7 @@ def test_a_world_stops_if_bodies_may_pass_through_each_other(moves, slower):
 
     def reason(value):
         given = {moves: [(value, 0, 0), (-value, 0, 0)], "orientation": (1, 0, 0, 0)}
-        (result,) = simulate([moving(ROD, far, (LAW,), 1e-4, 10, materials=material(), **given)])
+        (result,) = simulate([moving(ROD, far, (LAW, WEIGHTLESS), 1e-4, 10, materials=material(), **given)])
         return result.status.reason
 
     message = reason(motion)

@@ -225,15 +225,17 @@ def test_an_ellipsoid_comes_to_rest_in_a_cylinder():
 
 
 def test_a_body_at_a_rim_or_outside_a_cone_stops_the_world():
-    short = Walls(cylinders=[CylindricalSurface(start=(0, 0, 0), end=(0, 0, 0.02), radius=R)])
-    cone = Walls(cones=[ConicalSurface(start=(0, 0, 0), end=(0, 0, 0.02), start_radius=R, end_radius=D)])
-    for walls, place in ((short, (R - 0.9 * D, 0, -0.3 * D)), (cone, (5.6 * D, 0, 5 * D))):
-        made = moving(BALL, [place], (ELASTIC, walls), 1e-6, 5, materials=material())
-        (result,) = simulate([made])
-        assert not result.status.ok
-        assert "a body with a shape touches a rim, or a cone from outside" in result.status.reason
-    made = moving(BALL, [(R - 0.9 * D, 0, 0.3 * D)], (ELASTIC, short), 1e-6, 5, materials=material())
-    assert simulate([made])[0].status.ok
+    short = CylindricalSurface(start=(0, 0, 0), end=(0, 0, 0.02), radius=R)
+    cone = ConicalSurface(start=(FAR, 0, 0), end=(FAR, 0, 0.02), start_radius=R, end_radius=D)
+    walls = Walls(cylinders=[short], cones=[cone])
+    for x, z, ends in (
+        (R - 0.9 * D, -0.3 * D, True),
+        (FAR + 5.6 * D, 5 * D, True),
+        (R - 0.9 * D, 0.3 * D, False),
+    ):
+        (result,) = simulate([moving(BALL, [(x, 0, z)], (ELASTIC, walls), 1e-6, 5, materials=material())])
+        assert result.status.ok != ends
+        assert ("a body with a shape touches a rim, or a cone from outside" in result.status.reason) == ends
 
 
 REFUSED = {

@@ -322,6 +322,17 @@ WRONG = {
     "cells must be fine enough for 2 of them across the thinnest body, of 0.1 m; received (8, 8, 8)": {
         "solids": [SolidSphere((0, 0, 0), 0.05)]
     },
+    "cells must be fine enough for 2 of them along axis 0 across a body of 0.3 m; received (4, 8, 8)": {
+        "solids": [SolidSphere((0, 0, 0), 0.15)],
+        "cells": (4, 8, 8),
+    },
+    "cells must be such that faces of the grid lie in the bodies; received (1, 8, 8)": {
+        "solids": [SolidSphere((0.25, 0, 0), 0.2)],
+        "cells": (1, 8, 8),
+    },
+    "solids must be at most 10 m long along axis 0, 10 periods of the box; received 12.0": {
+        "solids": [SolidSphere((0, 0, 0), 6.0)]
+    },
     "cells must be three whole numbers, at least 1; received (8, 8)": {"cells": (8, 8)},
     "high must be above low in every component; received [1.0, 0.0, 1.0]": {"high": (1, 0, 1)},
     "viscosity must be above 0 Pa s; received 0": {"viscosity": 0},

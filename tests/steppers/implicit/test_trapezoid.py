@@ -11,6 +11,8 @@ from tests.throwaway import SoftShell, SoftShellOfAll, Trap
 from tisim import InputError, Simulation
 from tisim.backend.taichi import ti
 from tisim.effects import Force, Gravity, parameter
+from tisim.engine.loading import check_start
+from tisim.state.fields import CORE
 from tisim.steppers import Collocation, ErrorControl, FixedStep, IterationControl, StageControl, Trapezoid
 
 
@@ -237,3 +239,28 @@ def test_wrong_control_is_refused():
         Trapezoid(control=FixedStep(dt=1e-3))
     with pytest.raises(InputError, match=r"iteration_control\.longest must be at least shortest; received"):
         IterationControl(longest=1e-6, shortest=1e-5)
+
+
+def test_a_stride_below_the_path_in_the_shortest_step_is_refused():
+    """It could not be kept, and all steps would be the shortest. Particles that interact may move together at
+    any speed, and 0 sets no limit."""
+    start = {"velocity": np.array([[1.0, 0.0, 0.0], [4.0, 0.0, 0.0]]), "mass": np.array([2.0, 1.0])}
+    rule = r"0, or at least the path of the fastest particle in the shortest step"
+    for control in (IterationControl, StageControl):
+        for independent, path in ((True, 4e-12), (False, 2e-12)):
+            with pytest.raises(
+                InputError, match=rf"^stepper\.control\.stride must be {rule}, {path:g} m; received"
+            ):
+                control(stride=0.99 * path).check_start(start, False, independent)
+            control(stride=1.01 * path).check_start(start, False, independent)
+        control().check_start(start, False, True)
+    fast = {"velocity": np.array([[1e155, 1e155, 0.0]]), "mass": np.ones(1)}
+    with pytest.raises(InputError, match=r"inf m; received 1\.0$"):
+        IterationControl(stride=1.0).check_start(fast, False, True)
+
+
+def test_a_stride_is_refused_before_a_run():
+    stepper = Trapezoid(control=IterationControl(stride=1e-100))
+    setup = scene([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], (Gravity(),), stepper=stepper)
+    with pytest.raises(InputError, match=r"^stepper\.control\.stride must be 0, or at least the path"):
+        check_start(CORE, setup, setup.start())

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation as Turn
 
+from tisim.backend import runtime
 from tisim.domains.domain import Domain
 from tisim.effects.base import Field
 from tisim.effects.base.constraint import BODY_MASS
@@ -94,6 +95,12 @@ def _check_bodies(
     turn = Turn.from_quat(np.roll(quaternion, -1, axis=1))
     arm = turn.apply(start["clump_offset"][held])
     spin = turn.apply(turn.inv().apply(momentum) / inertia)
+    around = np.cross(spin, arm)
+    largest = np.finfo(np.float64 if runtime.precision() == "f64" else np.float32).max
+    fast = ~(np.abs([spin, around]) <= largest).all(axis=(0, 2))
+    worst = float(np.abs(momentum[fast]).max(initial=0.0))
+    rule = "so small that spin and velocities of the members of its clump are finite"
+    must(not fast.any(), "particles.clump_angular_momentum", rule, worst)
     apart = start["position"][held] - position - arm
     low, high = domain.bounds()
     if low is not None and high is not None:
@@ -102,9 +109,10 @@ def _check_bodies(
     rule = "where their clumps are, as Particles.of_clumps makes them"
     near = np.linalg.norm(apart, axis=1) <= APART * start["radius"][held]
     must(bool(near.all()), "particles.position", rule, Words("one elsewhere"))
-    lag = start["velocity"][held] - velocity - np.cross(spin, arm)
-    fastest = np.linalg.norm(velocity, axis=1).max() + np.linalg.norm(np.cross(spin, arm), axis=1).max()
-    alike = np.linalg.norm(lag, axis=1) <= APART * fastest
+    # The squares of large velocities overflow, but not their norms.
+    lag = np.hypot.reduce(start["velocity"][held] - velocity - around, axis=1)
+    fastest = np.hypot.reduce(velocity, axis=1).max() + np.hypot.reduce(around, axis=1).max()
+    alike = (lag <= APART * fastest) & np.isfinite(lag)
     must(
         bool(alike.all()),
         "particles.velocity",

@@ -23,6 +23,8 @@ TOLERANCES = (1e-7, 0.1)
 ITERATION_LIMIT = 5000
 FEWEST_CELLS = 2
 """Cells that the thinnest body must span."""
+MOST_PERIODS = 10
+"""Sides of the box along a periodic axis that a body may span."""
 
 
 @dataclass(frozen=True)
@@ -128,10 +130,10 @@ def stokes_flow(
     must(not across.any(), "pressure_gradient", f"along the {column}, axis {axis}", given)
     # In units in which the longest side of the grid, the viscosity and the pressure gradient are 1.
     unit = float((grid.spacing * grid.shape).max())
-    distances = [grid.distances(a, solids) / unit for a in range(3)]
     _check_resolved(solids, grid)
+    distances = [grid.distances(a, solids) / unit for a in range(3)]
     walls = NoSlip.at(distances, grid.spacing / unit)
-    _check_open(walls.solid, grid, drive)
+    _check_open(walls, grid, drive)
     operator = StokesOperator(grid.shape, grid.spacing / unit, cores())
     force, mean, iterations, residual = _forces(walls, operator, drive / strength, tolerance, progress)
     moving = operator.velocity(force)
@@ -197,7 +199,8 @@ def _grid(low: ArrayLike, high: ArrayLike, cells: Sequence[int], column: Column,
 
 
 def _check_resolved(solids: Sequence[SolidBody], grid: Grid) -> None:
-    """Raise InputError unless bodies or walls resist the fluid, and bodies are wider than cells."""
+    """Raise InputError unless bodies or walls resist the fluid, and bodies are wider than cells and shorter
+    than some periods of the box."""
     must(bool(solids) or grid.column != "none", "solids", "bodies, or a column with walls", Words("none"))
     used = np.array(grid.cells) > 1
     spacing = float(grid.spacing[used].min(initial=np.inf))
@@ -205,11 +208,26 @@ def _check_resolved(solids: Sequence[SolidBody], grid: Grid) -> None:
     rule = f"fine enough for {FEWEST_CELLS} of them across the thinnest body, of {thinnest:g} m"
     wide = thinnest >= FEWEST_CELLS * spacing * (1 - 1e-9) or not solids
     must(wide, "cells", rule, grid.cells)
+    if not solids:
+        return
+    # Bodies that are shorter than a cell along one axis may lie between the faces of the grid.
+    low, high = np.swapaxes([one.extent() for one in solids], 0, 1)
+    for b in np.flatnonzero(used):
+        shortest = float((high - low)[:, b].min())
+        rule = f"fine enough for {FEWEST_CELLS} of them along axis {b} across a body of {shortest:g} m"
+        must(shortest >= FEWEST_CELLS * grid.spacing[b] * (1 - 1e-9), "cells", rule, grid.cells)
+    # The images of longer bodies overlap so often that they would hardly leave a pore.
+    for b in np.flatnonzero(~np.array(grid.walled)):
+        longest, most = float((high - low)[:, b].max()), MOST_PERIODS * grid.cells[b] * float(grid.spacing[b])
+        rule = f"at most {most:g} m long along axis {b}, {MOST_PERIODS} periods of the box"
+        must(longest <= most, "solids", rule, longest)
 
 
-def _check_open(solid: np.ndarray, grid: Grid, drive: np.ndarray) -> None:
-    """Raise InputError unless the fluid can flow along the driving force."""
-    paths = through_paths(solid) * (grid.spacing * grid.shape)
+def _check_open(walls: NoSlip, grid: Grid, drive: np.ndarray) -> None:
+    """Raise InputError unless the fluid can flow along the driving force, and something resists it there."""
+    missed = bool(((np.array(walls.counts) == 0) & (drive != 0)).any())
+    must(not missed, "cells", "such that faces of the grid lie in the bodies", grid.cells)
+    paths = through_paths(walls.solid) * (grid.spacing * grid.shape)
     along = np.abs(paths @ drive)
     if not (along > 1e-9 * np.linalg.norm(paths, axis=1) * np.linalg.norm(drive)).any():
         cells = " x ".join(map(str, grid.cells))
@@ -264,14 +282,16 @@ def _forces(
     p, product, first = z.copy(), (r * z).sum(), 0.0
     for iteration in range(1, ITERATION_LIMIT + 1):
         response = apply(p)
-        step = product / (p * response).sum()
+        # A first guess without an error is a solution.
+        step = product / (p * response).sum() if product else 0.0
         f += step * p
         r -= step * response
         z, mean = precondition(r)
         residual = math.sqrt(((own * z) ** 2).mean()) / math.hypot(*mean)
         if progress:
             first = first or max(residual, 2 * tolerance)
-            progress(min(1.0, max(0.0, math.log(first / residual) / math.log(first / tolerance))))
+            gained = math.log(first / max(residual, tolerance)) / math.log(first / tolerance)
+            progress(max(0.0, gained))
         if residual <= tolerance:
             return spread(f) + inside, mean, iteration, residual
         before, product = product, (r * z).sum()

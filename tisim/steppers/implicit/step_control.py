@@ -7,6 +7,7 @@ far, the distances of particles from their starts, and not to the displacement i
 be added up over the run.
 """
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -111,6 +112,18 @@ class ImplicitControl(StepControl):
                 self.most
             )
         return max(duration / self.longest, float(growing))
+
+    def check_start(self, start: Mapping[str, np.ndarray], hard: bool, independent: bool) -> None:
+        if self.stride == 0:
+            return
+        with np.errstate(over="ignore", invalid="ignore"):
+            # Speeds whose squares overflow are infinite here, and refused.
+            velocity = start["velocity"]
+            if not independent:
+                velocity = velocity - np.average(velocity, axis=0, weights=start["mass"])
+            path = self.shortest * float(np.linalg.norm(velocity, axis=1).max())
+        rule = f"0, or at least the path of the fastest particle in the shortest step, {path:.3g} m"
+        must(self.stride >= path, "stepper.control.stride", rule, self.stride)
 
     @ti.func
     def step(self, s, w, target, speed):
