@@ -4,7 +4,6 @@ from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.effects.walls.confinement import Confinement
-from tisim.numerics.vectors import piece
 from tisim.pairs.listed_pairs import ExportedTerms
 from tisim.pairs.pair_sum import ListedLaws, PairSum
 from tisim.state.bound import Bound
