@@ -83,7 +83,8 @@ def opened(browser):
 
 @pytest.fixture
 def touching(record, rng):
-    """Grains that touch, across periodic faces too: the file, and for each frame the overlaps (m) by ids."""
+    """Grains that touch, across periodic faces too: the file, and for each frame Hertz's forces (N) by
+    ids."""
     from tisim import Material
     from tisim.effects import Granular
 
@@ -101,7 +102,10 @@ def touching(record, rng):
         apart = place[ids][:, None] - place[ids]
         depth = 4e-3 - np.linalg.norm(apart - 0.02 * np.rint(apart / 0.02), axis=2)
         pairs = np.argwhere(np.triu(depth >= 0, 1))
-        expected.append({(int(ids[i]), int(ids[j])): float(depth[i, j]) for i, j in pairs})
+        # E* = E / (2 (1 - nu^2)) of two equal materials, R* = R / 2.
+        modulus = 1e7 / (2 * (1 - 0.25**2))
+        force = 4 / 3 * modulus * np.sqrt(1e-3) * np.maximum(depth, 0) ** 1.5
+        expected.append({(int(ids[i]), int(ids[j])): float(force[i, j]) for i, j in pairs})
     return record(grains, made), expected
 
 

@@ -49,6 +49,7 @@ class ViewerData:
     """The data of a viewer.
 
     facts : plain data. recording : the compressed frames, one column after another, and the contacts.
+    network : these contacts; None without any.
     notices : sentences about frames, particles and contacts that are left out.
     """
 
@@ -56,6 +57,7 @@ class ViewerData:
     facts: dict[str, Any]
     recording: bytes
     notices: Sequence[str] = ()
+    network: ContactNetwork | None = None
 
 
 def viewer_data(sequence: FrameSequence, options: ReportOptions, reserved: float) -> ViewerData:
@@ -65,7 +67,7 @@ def viewer_data(sequence: FrameSequence, options: ReportOptions, reserved: float
     """
     trajectory, network, notices = recording(sequence, options, reserved)
     facts, data = player_facts(sequence, trajectory, network, options.lines)
-    return ViewerData(trajectory, facts | {"maps": colour_maps()}, data, notices)
+    return ViewerData(trajectory, facts | {"maps": colour_maps()}, data, notices, network)
 
 
 def player_facts(
