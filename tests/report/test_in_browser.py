@@ -17,6 +17,7 @@ from tisim.effects.walls.placement import placed_container
 from tisim.io.reader import frames
 from tisim.report.compressed_trajectory import compress
 from tisim.report.run_report import run_report
+from tisim.report.spectrum import Spectrum
 from tisim.report.view import view
 from tisim.report.viewer_data import ReportOptions
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
@@ -417,6 +418,34 @@ def test_what_is_shown_can_be_saved(moving, opened):
             assert saved(press.click).startswith(head), kind
         table = saved(page.get_by_role("button", name="Save balances as CSV").click)
         assert b"mass,kg" in table
+
+
+def test_a_spectrum_has_its_axis_and_the_expected_frequencies(record, opened, tmp_path):
+    omega = np.linspace(-300.0, 300.0, 601)
+    amplitudes = 2e-6 / (1 + ((omega - 100) / 5) ** 2) + 1e-12
+    one = Spectrum("spectrum of a motion", "m", omega, amplitudes, 1e-9, {"resonance": 100.0, "far": 1e4})
+    path = record(scene(1), [{"id": [0], "position": [[0.0, 0.0, 0.0]]}] * 2)
+    html = run_report(path, tmp_path / "r.html", options=ReportOptions(spectra=[one]))
+    with opened(html) as page:
+        chart = page.locator("#spectra svg.chart")
+        assert "angular frequency" in chart.text_content()
+        assert "resonance" in chart.text_content()
+        assert "far" not in chart.text_content(), "beyond the axis"
+        place = page.evaluate("report.spectra[0].x(100)")
+        drawn = [
+            float(x)
+            for x in page.locator("#spectra line.across").evaluate_all(
+                "(all) => all.map((one) => one.getAttribute('x1'))"
+            )
+        ]
+        assert drawn == pytest.approx([place])
+        with page.expect_download() as kept:
+            page.get_by_role("button", name="Save spectrum of a motion as CSV").click()
+        head, *rows = kept.value.path().read_text().splitlines()
+    assert head == "angular frequency (1/s),spectrum of a motion (m)"
+    values = [row.split(",") for row in rows]
+    peak = max(values, key=lambda row: float(row[1] or "nan") if row[1] not in ("", "null") else 0.0)
+    assert [float(one) for one in peak] == pytest.approx([100.0, 2e-6], rel=1e-5)
 
 
 def test_a_click_on_a_curve_jumps_to_its_time(moving, opened):

@@ -104,7 +104,11 @@ def run_page(
         state=state,
         verdict=verdict,
         summary=summary(ends, len(data.trajectory.times), count, (times[0], times[-1])),
-        facts=data.facts | {"series": {"times": tables.digits(times), "curves": panels}},
+        facts=data.facts
+        | {
+            "series": {"times": tables.digits(times), "curves": panels},
+            "spectra": [one.facts() for one in options.spectra],
+        },
         recording=data.recording,
         notices=[*sentences, *data.notices],
         sections=list(_sections(scene, result, (first, last), options)),
@@ -148,7 +152,8 @@ def _sections(
     scene: Scene, result: Result | None, states: tuple[Arrays, Arrays], options: ReportOptions
 ) -> list[Section]:
     """Return the sections below the view."""
-    happened = f'<div id="curves"></div>\n<div id="numbers">{numbers(result, states)}</div>'
+    spectra = '<h3>Spectra</h3>\n<div id="spectra"></div>\n' if options.spectra else ""
+    happened = f'<div id="curves"></div>\n{spectra}<div id="numbers">{numbers(result, states)}</div>'
     sections = [
         Section("happened", "What happened", happened),
         Section("asked", "What was asked", _asked(scene)),
