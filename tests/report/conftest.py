@@ -27,22 +27,26 @@ def scene(n=4, **settings):
     )
 
 
+def recorded(path, of_scene, frames, measures=()):
+    """Write a trajectory of frames, each a dict of arrays (``id`` and ``position`` at least)."""
+    with Trajectory(path, [of_scene]) as file:
+        for k, given in enumerate(frames):
+            n = len(given["id"])
+            arrays = {
+                field.name: np.full(field.shape(n), 1e-3 if field.name in ("radius", "mass") else 0.0)
+                for field in recorded_fields(of_scene)
+            }
+            arrays = {name: np.asarray(given.get(name, values)) for name, values in arrays.items()}
+            file.write(0, Frame(k * 0.01, k, arrays, measures[k] if measures else {}))
+    return path
+
+
 @pytest.fixture
 def record(tmp_path):
-    """Write a trajectory of frames, each a dict of arrays (``id`` and ``position`` at least)."""
+    """Write a trajectory, as ``recorded``, into a folder of the test."""
 
     def write(of_scene, frames, name="trajectory.h5", measures=()):
-        path = tmp_path / name
-        with Trajectory(path, [of_scene]) as file:
-            for k, given in enumerate(frames):
-                n = len(given["id"])
-                arrays = {
-                    field.name: np.full(field.shape(n), 1e-3 if field.name in ("radius", "mass") else 0.0)
-                    for field in recorded_fields(of_scene)
-                }
-                arrays = {name: np.asarray(given.get(name, values)) for name, values in arrays.items()}
-                file.write(0, Frame(k * 0.01, k, arrays, measures[k] if measures else {}))
-        return path
+        return recorded(tmp_path / name, of_scene, frames, measures)
 
     return write
 
