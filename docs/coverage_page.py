@@ -26,8 +26,8 @@ parts of a scene that do it, and a command that runs it. The [code and the tests
 on another page.
 """  # noqa: E501
 MEANING = """
-*Works*: it is used in a scene, and a test or a check holds it. *In part*: some of it, or another size, or without a
-conclusion of the source; the row says which. *Left out*: not there, with the reason. {laboratory} rows are laboratory work. Of the other {others} rows, {whole} work.
+*Works*: it is used in a scene, and confirmed by a test or a check. *In part*: only some of it, or at another size, or a
+conclusion of the source is not reached; the row says which. *Left out*: it is not in tisim; the row gives the reason. {laboratory} rows are laboratory work. Of the other {others} rows, {whole} work.
 """  # noqa: E501
 NUMBERS = r"""
 ± is half of a 95 % interval. Numbers with a star \* were printed by `tisim check` (physics version {physics},

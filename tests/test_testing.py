@@ -31,7 +31,7 @@ from tisim.effects import (
     option,
 )
 from tisim.forces.loads import FORCE
-from tisim.operators import Capture, JoinGroup, Operator, Outflow
+from tisim.operators import Capture, Inlet, JoinGroup, Operator, Outflow, Outlet
 from tisim.program.phases import PerParticle
 from tisim.sources import MagneticCylinders, MagneticField, MagneticSpheres
 from tisim.state.fields import Field
@@ -359,11 +359,12 @@ def test_a_field_that_only_others_declare_is_reported():
         assert_fields(two(*effects, charge=[1.0, 1.0]))
 
 
-# Capture, constraints and the virial exclude impacts. Cylinders have no force law, and their series takes
-# long to compile. Outflow weighs particles before it removes them. Permanent moments exclude soft ones. Tree
-# gravity has no images, which Ewald sums need. Rigid shapes exclude laws for spheres. Dipole forces go only
-# with mutual moments of the same cut-off.
+# Capture, constraints and the virial exclude impacts. Faces at which particles enter and leave exclude pairs.
+# Cylinders have no force law, and their series takes long to compile. Outflow weighs particles before it
+# removes them. Permanent moments exclude soft ones. Tree gravity has no images, which Ewald sums need. Rigid
+# shapes exclude laws for spheres. Dipole forces go only with mutual moments of the same cut-off.
 RODS, BRICKS, MIXED = [RigidRods], [RigidSuperquadrics], [RigidMixture]
+FACES = [Inlet, Outlet]
 HOLDING = [PrescribedMotion, RigidClumps, JoinGroup]
 IMAGED = [EwaldDipoleDipole, EwaldFroehlichMoment, EwaldInducedMoment, EwaldLangevinMoment]
 DIPOLES = [DipoleDipole, TruncatedDipoleDipole]
@@ -376,6 +377,7 @@ APART = (
     *RODS,
     *BRICKS,
     *MIXED,
+    *FACES,
     *HOLDING,
     *IMAGED,
     *DIPOLES,
@@ -391,6 +393,7 @@ TOGETHER = [
     "kinds",
     [
         [Capture, Virial],
+        FACES,
         HOLDING,
         RODS,
         BRICKS,
@@ -400,6 +403,7 @@ TOGETHER = [
     ],
     ids=[
         "capture",
+        "inlet and outlet",
         "constraints",
         "rods",
         "superquadrics",

@@ -101,7 +101,7 @@ def of_rods(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     for name, what in (("fraction", "packing fraction"), ("contacts", "contact number")):
         for aspect in dict.fromkeys([*aspects[:1], *aspects[-1:]]):
             pair = [of(chosen(rows, shape=aspect, method=method), name) for method in ("revised", "original")]
-            subject = f"{what}, revised less original, Lambda = {aspect:g}"
+            subject = f"{what}, revised minus original, Lambda = {aspect:g}"
             published = "0" if name == "fraction" else "slightly above 0 for long rods"
             yield Compared(subject, published, text(pair[0].minus(pair[1])))
 

@@ -60,18 +60,21 @@ def starts_of(study: Study, size: str) -> int:
 
 
 def drawn(made: Mapping[Study, list[Packing]]) -> dict[str, Figure]:
-    """Return the figures of studies; rods in a periodic box are always among them."""
+    """Return the figures of studies. Those of cylinders and wedges need rods in a periodic box as well."""
     # Packings end in any order.
     made = {study: sorted(some, key=lambda one: one[0].place()) for study, some in made.items()}
     rows = {study: [row for row, _ in some] for study, some in made.items()}
-    free = rows["aspect ratio"]
-    curves_of: Mapping[str, tuple[Study, Callable[[list[PackedRow]], Figure]]] = {
+    free = rows.get("aspect ratio", [])
+    curves_of: dict[str, tuple[Study, Callable[[list[PackedRow]], Figure]]] = {
         "rods.png": ("aspect ratio", lambda some: curves.of_rods([*some, *rows.get("long rods", [])])),
         "inertia.png": ("moment of inertia", curves.of_inertia),
-        "cylinder.png": ("cylinder", lambda some: curves.of_cylinders(some, free)),
-        "wedge.png": ("wedge", lambda some: curves.of_wedges(some, free)),
         "superballs.png": ("superballs", curves.of_superballs),
     }
+    if free:
+        curves_of |= {
+            "cylinder.png": ("cylinder", lambda some: curves.of_cylinders(some, free)),
+            "wedge.png": ("wedge", lambda some: curves.of_wedges(some, free)),
+        }
     bodies_of: Mapping[str, tuple[Study, Callable[[list[Packing]], Figure]]] = {
         "cylinders.png": ("cylinder", snapshots.in_cylinders),
         "wedges.png": ("wedge", snapshots.in_wedges),

@@ -25,14 +25,14 @@ from tisim.backend import memory
 APART, SIDE = 0.025, 3
 """Distance from each copy of the particles to the next, m; and copies along each side of a cube. These fit
 the box of scenes that need images."""
-ONE_BODY = "effects.rigid_clumps"
-"""Copies of its particles would all belong to one clump."""
+NOT_COPIED = ("effects.rigid_clumps", "effects.reflecting_walls")
+"""Scenes whose particles have no copies: all would belong to one clump, or be outside of the walls."""
 
 
 def scene_of(name: str) -> Scene:
     """A scene of ``extremes.scenes()`` with copies of its particles, at slightly different velocities."""
     data = copy.deepcopy(extremes.scenes()[name])
-    if name == ONE_BODY:
+    if name in NOT_COPIED:
         return Scene.from_dict(data)
     draw = np.random.Generator(np.random.Philox(3))
     cells = np.stack(np.meshgrid(*[np.arange(SIDE) - SIDE // 2] * 3, indexing="ij"), -1).reshape(-1, 3)

@@ -32,6 +32,14 @@ def bits_of(backend, schedule, folder, names=()):
     return json.loads(file.read_text())
 
 
+@pytest.mark.parametrize("name", extremes.scenes())
+def test_a_scene_of_every_kind_can_begin(name):
+    made = scene_of(name)
+    start = made.start()
+    for effect in made.acting():
+        effect.check_start(start, made)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("names", [FAMILIES[:1], pytest.param(FAMILIES[1:], marks=pytest.mark.slow)])
 def test_scenes_of_some_families(tmp_path, names):

@@ -18,6 +18,7 @@ def test_cases_explain_and_version(tisim):
     assert "agglomeration" in out
     assert "--size paper" in out
     assert "surface energy 100 to 100000 J/m^2" in out
+    assert "--variant NAME of tisim run: spheres, rods, " in " ".join(out.split())
     code, out, _ = tisim("explain", "agglomeration", "--size", "small")
     assert code == 0
     assert "60 particles" in out

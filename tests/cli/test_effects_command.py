@@ -93,7 +93,7 @@ def test_plugin_effects_are_listed_in_their_family(tisim, own_file):
 def test_an_unknown_name_is_wrong_input(tisim):
     code, out, err = tisim("effects", "impcat")
     assert (code, out) == (2, "")
-    assert err.startswith("effect must be one of ")
-    assert " agglomeration, " in err
+    assert err.startswith("part must be one of ")
+    assert " that 'tisim effects' lists, such as impact, " in err
     assert err.endswith("; received 'impcat'; did you mean 'impact'?\n")
     assert tisim("effects", "operatrs")[2].endswith("; received 'operatrs'; did you mean 'operators'?\n")

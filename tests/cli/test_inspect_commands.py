@@ -68,7 +68,7 @@ def test_a_folder_without_data_to_draw_is_refused(tisim, tmp_path):
     assert tisim("plot", "out") == (2, "", f"{rule} neither\n")
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "search.h5").touch()
-    message = "folder must be one of a run; received the folder of a search, with the pictures:"
+    message = "folder must be the folder of a run; received the folder of a search, with the pictures:"
     assert tisim("plot", "s") == (2, "", f"{message} none yet\n")
     for name in ("front.png", "convergence.png"):
         (tmp_path / "s" / name).touch()
@@ -232,9 +232,15 @@ def test_wrong_input(tisim, toml, tmp_path):
             ["run", toml, "--frames", 2, "--every", 1],
             "recording must be given frames or every; received both",
         ),
-        (["plot", "none.h5"], "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5'"),
+        (
+            ["plot", "none.h5"],
+            "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5', which does not exist",
+        ),
         (["movie", toml], "file must be a trajectory.h5 or result.h5 of a run; received 'flow.toml'"),
-        (["export", "none.h5"], "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5'"),
+        (
+            ["export", "none.h5"],
+            "file must be a trajectory.h5 or result.h5 of a run; received 'none.h5', which does not exist",
+        ),
     ):
         code, out, err = tisim(*arguments)
         assert (code, out) == (2, "")

@@ -68,15 +68,12 @@ def test_a_run_is_served_until_ctrl_c(growing, command, tmp_path):  # noqa: F811
 
 def test_wrong_input_is_refused(tisim, growing, tmp_path):  # noqa: F811
     growing().write()
-    (tmp_path / "costs").mkdir()
-    (tmp_path / "costs" / "cost.h5").touch()
     (tmp_path / "scene.toml").touch()
     for arguments, message in (
-        (("none",), "folder to watch must be an existing one; received 'none'"),
+        (("none",), "folder to watch must be an existing folder or file; received 'none'"),
         ((".", "--port", 70000), "port must be 0 to 65535; received 70000"),
         ((".", "--port", "x"), "port"),
         ((".", "--world", 3), "world must be 0 to 0; received 3"),
-        (("costs",), "folder to watch must be one of a run or a search; received costs, of a study of costs"),
         (("scene.toml",), "file must be a trajectory.h5 or result.h5 of a run"),
     ):
         code, out, err = tisim("watch", *arguments, "--no-open")

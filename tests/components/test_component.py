@@ -37,7 +37,8 @@ class SampleSpring(Component):
         ({"stiffness": 1, "share": -0.5}, "sample_spring.share must be at least 0.0; received -0.5"),
         (
             {"stiffness": 1, "stifness": 2},
-            "sample_spring.stifness must be a known key: stiffness, axis, share, stiff or order; received 2",
+            "sample_spring.stifness must be a known key: stiffness, axis, share, stiff or order; received 2; "
+            "did you mean 'stiffness'?",
         ),
         (
             {"stiffness": 1, "stiff": "perhaps"},

@@ -69,10 +69,10 @@ def test_intervals_have_their_coverage(kind):
 def test_a_target_is_met_with_confidence(kind):
     """If no design meets the target, at most one search in 20 stops at it.
 
-    If some designs do, at most one in 20 of the searches that stop is wrong. The standard deviation of a start
-    is 0.2, so the interval of the check, over 16 starts, reaches 0.1 to either side: a target 0.1 above the
-    best mean is met by chance at best, one 0.2 above it by most searches with normal noise and by about half
-    of those with skewed noise, whose intervals are wider.
+    If some designs do, at most one in 20 of the searches that stop is wrong. The standard deviation of a
+    start is 0.2, so the interval of the check, over 16 starts, reaches 0.1 to either side: a target 0.1 above
+    the best mean is met by chance at best. One 0.2 above it is met by most searches with normal noise and by
+    about half of those with skewed noise, whose intervals are wider.
     """
     chance = 1.96 * math.sqrt(0.05 * 0.95 / SEARCHES)
     stopped, _ = experiment.stopped_at_target(kind, SEARCHES, -1e-9)

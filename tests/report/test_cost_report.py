@@ -38,17 +38,21 @@ ROWS = [
 ROWS[-1] = Row(**vars(ROWS[-1]) | {"steps": math.nan, "sums": math.nan, "rejections": math.nan})
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    """The folder of a study that was never run."""
-    folder = tmp_path_factory.mktemp("cost")
+def write_study(folder, rows, complete=False):
+    """Write a study that was never run, as ``tisim cost`` does after each row."""
     quantities = [Quantity("displacement", np.ndarray.sum), Quantity("speed", np.ndarray.sum)]
     made = Study(scene(4, name=HOSTILE), quantities)
-    made.rows = list(ROWS)
+    made.rows, made.complete = list(rows), complete
     truth = QuantityEstimate(np.array([2.0]), 2e-4)
     made.truths = (Truth(truth, "Lobatto", 2.0), Truth(QuantityEstimate(np.array([1.0])), "theory", 1.0))
     write(made, folder)
     return folder
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The folder of a study."""
+    return write_study(tmp_path_factory.mktemp("cost"), ROWS)
 
 
 def test_the_page_has_every_setting(study, tmp_path):
@@ -85,7 +89,10 @@ def test_the_page_has_every_setting(study, tmp_path):
 def test_wrong_input_is_refused(tisim, study, tmp_path):  # noqa: F811
     assert tisim("report", study, "--to", "p/c.html") == (0, "p/c.html\n", "")
     for arguments, message in (
-        (("--designs", 2), f"options must be for a study of costs, as {study} is one; received '--designs'"),
+        (
+            ("--designs", 2),
+            f"options must be for the page of a study of costs, as {study} holds one; received '--designs'",
+        ),
         (("--limit", 0.01), "limit must be at least the size of the page, 0."),
     ):
         code, _, err = tisim("report", study, *arguments)

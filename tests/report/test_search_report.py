@@ -272,7 +272,10 @@ def test_the_command_finds_what_it_has_been_given(tisim, one, tmp_path):  # noqa
     assert tisim("report", folder / "search.h5", "--to", "p/page.html")[0] == 0, "its own page is replaced"
     (tmp_path / "mine.html").write_text("the user's own")
     for arguments, message in (
-        (("--checks", "a.csv"), f"options must be for a search, as {folder} is one; received '--checks'"),
+        (
+            ("--checks", "a.csv"),
+            f"options must be for the page of a search, as {folder} holds one; received '--checks'",
+        ),
         (("--world", 0, "--field", "x"), "received '--world, --field'"),
         (("--to", "a.txt"), "--to must be a file NAME.html; received 'a.txt'"),
         (("--limit", 0.1), "limit must be at least 0.5 MB, and finite; received 0.1"),
@@ -289,7 +292,8 @@ def test_the_command_finds_what_it_has_been_given(tisim, one, tmp_path):  # noqa
     (tmp_path / "none").mkdir()
     code, _, err = tisim("report", "none")
     assert code == 2
-    assert "folder must be one of a run, a search or 'tisim cost'; received 'none'" in err
+    assert "folder must be the folder of a run, a search or 'tisim cost'; received 'none', without" in err
+    assert "FILE must be an existing folder or file; received 'gone'" in tisim("report", "gone")[2]
 
 
 def test_the_command_of_a_search_is_kept(tisim, own_file):  # noqa: F811

@@ -133,7 +133,7 @@ class TestReplace:
                 "effects.impact.hardnes",
                 1,
                 "impact.hardnes must be a known key: name, hardness, deformation_length, initial_area, "
-                "final_area, tolerance or max_iterations; received 1",
+                "final_area, tolerance or max_iterations; received 1; did you mean 'hardness'?",
             ),
             (
                 "effects.impcat.hardness",

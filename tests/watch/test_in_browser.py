@@ -8,10 +8,9 @@ import pytest
 from tests.report.test_in_browser import PICKED_PIXELS, READ_PICKED, until
 from tisim.engine.result import Status
 from tisim.io.reader import Frame
-from tisim.optimize.report import watched_search
 from tisim.report.page import static
+from tisim.watch import remade, watched
 from tisim.watch import run as module
-from tisim.watch import watched
 from tisim.watch.run import WatchedRun
 from tisim.watch.server import WatchServer
 
@@ -27,7 +26,7 @@ def watching(browser, tmp_path, monkeypatch, unlimited):
 
     @contextmanager
     def show(answers=None):
-        for one in (module, watched_search, watched):
+        for one in (module, remade, watched):
             monkeypatch.setattr(one, "POLL", 0.2)
         with WatchServer(answers or WatchedRun(tmp_path, budget=unlimited).answers) as server:
             context = browser.new_context(viewport={"width": 1000, "height": 800})

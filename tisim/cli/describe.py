@@ -40,6 +40,8 @@ def cases() -> None:
         for name, size in case.sizes.items():
             usual = "; default of tisim cost" if name == case.cost_size else ""
             table.add_row(f"    --size {name}", f"{size.summary}{usual}")
+        if case.scenes:
+            table.add_row("    --variant NAME", f"of tisim run: {', '.join(case.scenes)}")
         if case.problem is not None:
             for variant in case.variants:
                 problem = case.problem("default", variant)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,7 +11,7 @@ from rich.text import Text
 
 from tisim.backend import runtime
 from tisim.cli.check import VERDICTS
-from tisim.cli.options import Device, Out, Overwrite, Threads
+from tisim.cli.options import Device, Overwrite, Threads, nameable
 from tisim.console import err, out, plain_table, progress_bar
 from tisim.errors import RunError, must
 from tisim.files import output_folder, pictures
@@ -22,6 +23,15 @@ if TYPE_CHECKING:
 Names = Annotated[
     list[str] | None,
     typer.Argument(metavar="[NAME]...", help="Families and cases to run; without a name, list all."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        callback=nameable,
+        help="Also write numbers and pictures to this folder.",
+    ),
 ]
 Whole = Annotated[bool, typer.Option("--all", help="Run all hard cases.")]
 

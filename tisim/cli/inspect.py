@@ -87,8 +87,8 @@ def plot(
 ) -> None:
     """Draw pictures of a run.
 
-    They show the cloud, the time series of energy, centre of gravity and number of particles, the forces on
-    walls and driven groups, and more if the run is of a case. The options are for the cloud.
+    They show the particles, the time series of energy, centre of gravity and number of particles, the forces
+    on walls and driven groups, and more if the run is of a case. The options are for the particles.
     """
     from tisim.io.reader import frames
 
@@ -284,6 +284,7 @@ def trajectory_file(path: Path) -> Path:
         if regular_file.exists(path / name):
             pictures = ", ".join(sorted(str(file) for file in path.glob("*.png"))) or "none yet"
             raise InputError(
-                f"folder must be one of a run; received the folder of {what}, with the pictures: {pictures}"
+                f"folder must be the folder of a run; received the folder of {what}, with the pictures: "
+                f"{pictures}"
             )
     raise InputError(f"folder must be one with a trajectory.h5 or result.h5; received {str(path)!r}{why}")

@@ -143,7 +143,5 @@ Frames = Annotated[
 ]
 Every = Annotated[
     float | None,
-    typer.Option(
-        "--every", metavar="SECONDS", help="As --frames, but given as the simulated time between frames."
-    ),
+    typer.Option("--every", metavar="SECONDS", help="Simulated time between frames, in place of --frames."),
 ]

@@ -94,7 +94,7 @@ def report(
     designs: Annotated[
         int,
         typer.Option(
-            min=0, max=100, help="Of a search: run this number of its best designs, to show their clouds."
+            min=0, max=100, help="Of a search: run this number of its best designs, to show their particles."
         ),
     ] = 0,
     problem: Annotated[
@@ -114,11 +114,17 @@ def report(
     page of a search shows its convergence, its front and all its designs; the page of a study shows errors
     against times.
     """
+    must(
+        regular_file.is_folder(file) or regular_file.exists(file),
+        "FILE",
+        "an existing folder or file",
+        str(file),
+    )
     kind, source = _kind(file)
     given = given_options(context)
     for of_kind, options in OPTIONS_OF.items():
         wrong = [option for name, option in options.items() if name in given and of_kind != kind]
-        must(not wrong, "options", f"for {kind}, as {file} is one", ", ".join(wrong))
+        must(not wrong, "options", f"for the page of {kind}, as {file} holds one", ", ".join(wrong))
     path = to or source.parent / "report.html"
     must(path.suffix in (".html", ".htm"), "--to", "a file NAME.html", str(path))
     if kind == RUN_PAGE:
@@ -139,7 +145,10 @@ def _kind(path: Path) -> tuple[str, Path]:
         for name, kind in PAGE_OF.items():
             if any(regular_file.exists(path / one) for one in (name, f"{name}.journal")):
                 return kind, path / name
-        raise InputError(f"folder must be one of a run, a search or 'tisim cost'; received {str(path)!r}")
+        raise InputError(
+            f"folder must be the folder of a run, a search or 'tisim cost'; received {str(path)!r}, without "
+            f"their files"
+        )
     return RUN_PAGE, trajectory_file(path)
 
 

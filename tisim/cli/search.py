@@ -259,7 +259,9 @@ def compare(
 
 
 def cache(
-    file: Annotated[Path, typer.Argument(help="The search.h5 of a search.", callback=nameable)],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The search.h5 of a search.", callback=nameable)
+    ],
     verify: Annotated[
         bool, typer.Option("--verify", help="Check every record; exit code 1 if any is damaged.")
     ] = False,

@@ -16,17 +16,20 @@ import typer
 
 from tisim.cli.inspect import World
 from tisim.cli.options import Plugins, nameable
-from tisim.errors import Words, must
+from tisim.errors import must
 from tisim.files import regular_file
 from tisim.streams import say
 
 if TYPE_CHECKING:
-    from tisim.watch.server import Replies
+    from tisim.watch.folder import Kind
+    from tisim.watch.watched import Watched
 
 Folder = Annotated[
     Path,
     typer.Argument(
-        help="The folder of a run or of a search, or its trajectory.h5.", metavar="OUT", callback=nameable
+        help="The folder of a run, of a search or of 'tisim cost', or a file in it.",
+        metavar="OUT",
+        callback=nameable,
     ),
 ]
 
@@ -40,16 +43,19 @@ def watch(
     world: World = 0,
     plugins: Plugins = None,
 ) -> None:
-    """Show a run or a search in the browser while it is running: the page of 'tisim report', kept up to date.
+    """Show a run, a search or a study of costs in the browser while it goes on: the page of 'tisim report',
+    kept up to date.
 
     The page is served to this machine alone, at an address with a random token, until Ctrl-C. Nothing is
     written. After the first page it takes less than 1 % of the cores.
     """
+    from tisim.watch.folder import WatchedFolder
     from tisim.watch.server import WatchServer
 
     exists = regular_file.is_folder(folder) or regular_file.exists(folder)
-    must(exists, "folder to watch", "an existing one", str(folder))
-    with WatchServer(_answers(folder, world), port) as server, _link(server.address) as link:
+    must(exists, "folder to watch", "an existing folder or file", str(folder))
+    watched = WatchedFolder(folder, lambda kind: _begin(kind, folder, world))
+    with WatchServer(watched.answers, port) as server, _link(server.address) as link:
         print(server.address, flush=True)
         say("watching until Ctrl-C")
         if open_:
@@ -60,22 +66,21 @@ def watch(
             say("stopped")
 
 
-def _answers(path: Path, world: int) -> Replies:
-    """Return the answers of the pages of a search, or else of a run."""
-    is_search = path.name == "search.h5" or any(
-        regular_file.exists(path / name) for name in ("search.h5", "search.h5.journal")
-    )
-    if is_search:
+def _begin(kind: Kind, path: Path, world: int) -> Watched:
+    """Begin to watch a search, a study of costs or a run."""
+    if kind == "search":
         from tisim.optimize.report.watched_search import WatchedSearch
 
-        return WatchedSearch(path).answers
+        return WatchedSearch(path)
+    if kind == "cost":
+        from tisim.watch.cost_study import WatchedStudy
+
+        return WatchedStudy(path)
     from tisim.watch.run import WatchedRun
 
-    of_costs = regular_file.is_folder(path) and regular_file.exists(path / "cost.h5")
-    must(not of_costs, "folder to watch", "one of a run or a search", Words(f"{path}, of a study of costs"))
     run = WatchedRun(path, world)
     run.check()
-    return run.answers
+    return run
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from tisim.errors import InputError, abbreviated, printable
+from tisim.errors import InputError, abbreviated, did_you_mean, printable
 
 
 def unit_of(info: FieldInfo) -> str:
@@ -68,14 +68,17 @@ def explain_invalid(invalid: ValidationError, where: str, fields: Mapping[str, F
             for line in _named_within(name, loc, str(context["error"])):
                 lines.setdefault(line, [])
             continue
+        nearest = ""
         rule = _RULES[fault["type"]].format(**context) if fault["type"] in _RULES else ""
         rule = rule or fault["msg"].removeprefix("Input should be ")
         if len(loc) == 1 and fault["type"] == "missing":
             rule += _meaning(fields[str(loc[0])])
         elif len(loc) == 1 and fault["type"] == "extra_forbidden":
             rule = f"{rule}: {' or '.join(', '.join(fields).rsplit(', ', 1)) or 'there is none'}"
+            nearest = did_you_mean(str(loc[0]), fields)
         lines.setdefault(name, []).append(rule)
-        received.setdefault(name, "nothing" if fault["type"] == "missing" else abbreviated(fault["input"]))
+        value = "nothing" if fault["type"] == "missing" else abbreviated(fault["input"])
+        received.setdefault(name, f"{value}{nearest}")
     text = [
         f"{name} must be {' or '.join(dict.fromkeys(rules))}; received {received[name]}" if rules else name
         for name, rules in lines.items()

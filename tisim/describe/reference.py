@@ -21,7 +21,7 @@ from tisim.domains.domain import Domain
 from tisim.effects.base import Effect
 from tisim.effects.contact.granular.parts import ContactPart
 from tisim.effects.walls.motion import Motion
-from tisim.errors import InputError, abbreviated, did_you_mean
+from tisim.errors import InputError, abbreviated, did_you_mean, some_of
 from tisim.geometry.container import Container
 from tisim.geometry.shape import Shape
 from tisim.materials.materials import ContactProperties
@@ -156,8 +156,8 @@ def find(name: str) -> Entry:
     none."""
     known = names()
     if name not in known:
-        rule, nearest = f"one of {', '.join(sorted(known))}", did_you_mean(name, (*known, *groups()))
-        raise InputError(f"effect must be {rule}; received {abbreviated(name)}{nearest}")
+        rule, nearest = some_of(known, name, "'tisim effects'"), did_you_mean(name, (*known, *groups()))
+        raise InputError(f"part must be one of {rule}; received {abbreviated(name)}{nearest}")
     return describe(*known[name])
 
 

@@ -348,7 +348,8 @@ def _open_file(path: Path) -> Iterator[_RetryingFile]:
     """Yield the file after the checksum of its superblock, or of the whole file, is verified."""
     rule, real = "a trajectory.h5 or result.h5 of a run", regular_file.target(path)
     head = regular_file.content(real, SIZE)
-    must(head is not None and head.startswith(SIGNATURE), "file", rule, str(path))
+    must(head is not None, "file", rule, Words(f"{str(path)!r}, which does not exist"))
+    must((head or b"").startswith(SIGNATURE), "file", rule, str(path))
     if not is_valid(head or b""):
         with contextlib.closing(_RetryingFile(io.BytesIO(checksum.read_image(real, "file", rule)))) as file:
             is_result = file.read(lambda hdf5: hdf5.attrs.get("format") == RESULT)

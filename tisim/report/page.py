@@ -27,7 +27,8 @@ COST_SCRIPTS = (*COMMON_SCRIPTS, *PLOT_SCRIPTS, "cost.js")
 SEARCH_SCRIPTS = (*COMMON_SCRIPTS, *PARTICLE_SCRIPTS, *PLOT_SCRIPTS, "parallel.js", "search.js")
 """The scripts of the pages of a run, of a study of costs and of a search, in order; the last one begins."""
 WATCHED_RUN_SCRIPTS = (*RUN_SCRIPTS[:-1], "joined.js", "run.js", "live.js", "watch.js")
-WATCHED_SEARCH_SCRIPTS = (*SEARCH_SCRIPTS, "live.js", "watch_search.js")
+WATCHED_SEARCH_SCRIPTS = (*SEARCH_SCRIPTS, "live.js", "remade.js", "watch_search.js")
+WATCHED_COST_SCRIPTS = (*COST_SCRIPTS, "live.js", "remade.js", "watch_cost.js")
 """The scripts of pages that are watched."""
 PARTICLE_VIEW = '<section id="viewer" class="waiting" aria-label="Particles"></section>'
 """The place of the view of the particles."""

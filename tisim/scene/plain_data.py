@@ -32,7 +32,9 @@ def scene_fields(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     if "stepper" in rest:
         stepper = {"kind": Verlet.kind(), **serialization.table(rest.pop("stepper"), "stepper")}
         fields["stepper"] = serialization.from_dict(Stepper, stepper, "stepper", folder)
-    effects_table = serialization.table(rest.pop("effects", {}), "scene.effects", "a table of effects")
+    effects_table = serialization.table(
+        rest.pop("effects", {}), "scene.effects", "a table of effects, such as [effects.impact]"
+    )
     fields["effects"] = tuple(_effect(name, values, folder) for name, values in effects_table.items())
     for name in rest.keys() & {"materials", "material_pairs"}:
         named = serialization.table(rest.pop(name), f"scene.{name}", "a table of tables")

@@ -16,7 +16,7 @@ from tisim.components.serialization import json_pieces
 from tisim.domains.domain import Box, Domain, Open
 from tisim.domains.sheared_box import ShearedBox
 from tisim.effects.base import Effect
-from tisim.errors import InputError, Words, abbreviated, must
+from tisim.errors import InputError, Words, abbreviated, did_you_mean, must
 from tisim.files import python_file
 from tisim.materials.material_law import UsesMaterials
 from tisim.materials.materials import Material, MaterialPair, Materials
@@ -302,8 +302,10 @@ class Scene(Component, ShownInNotebook):
             return self
         data = self.to_dict()
         for name in names:
-            present = ", ".join(data["effects"]) or "none, as this scene has none"
-            must(name in data["effects"], "effect to leave out", f"one of {present}", name)
+            if name not in data["effects"]:
+                present = ", ".join(data["effects"]) or "none, as this scene has none"
+                received = f"{abbreviated(name)}{did_you_mean(name, data['effects'])}"
+                raise InputError(f"effect to leave out must be one of {present}; received {received}")
         others = {kind: values for kind, values in data["effects"].items() if kind not in names}
         return type(self).from_dict({**data, "effects": others})
 

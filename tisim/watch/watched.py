@@ -37,10 +37,10 @@ class Watched:
         }
 
 
-def waiting_page(path: Path, why: str, script: str) -> str:
+def waiting_page(path: Path, why: str, *scripts: str) -> str:
     """Return the HTML of a page that asks its server until there are files to show, with the reason to wait.
 
-    script : name of a file in report/static, which asks the server.
+    scripts : names of files in report/static, the last of which asks the server.
     """
     return Page(
         title=path.name or str(path),
@@ -49,7 +49,7 @@ def waiting_page(path: Path, why: str, script: str) -> str:
         summary=why,
         facts={"live": {"waiting": True, "poll": POLL}},
         recording=b"",
-        scripts=(*COMMON_SCRIPTS, "live.js", script),
+        scripts=(*COMMON_SCRIPTS, "live.js", *scripts),
         view="",
         connects=True,
     ).html()

@@ -150,7 +150,7 @@ def test_rods_and_superballs_beside_b16():
     rods = [*FREE, *(row("aspect ratio", 3.0, seed, "revised", contacts=6.5) for seed in range(3))]
     found = compared("aspect ratio", rods)
     assert line(found, "densest aspect ratio").startswith("2, 0.610")
-    assert line(found, "contact number, revised less original, Lambda = 3").startswith("0.5")
+    assert line(found, "contact number, revised minus original, Lambda = 3").startswith("0.5")
     assert "0.1" in line(found, "largest S")
     assert of_rods(rods).axes[1].get_xscale() == "log"
     balls = [

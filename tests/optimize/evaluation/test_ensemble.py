@@ -193,7 +193,10 @@ def test_settings_are_checked():
         InputError, match=r"search\.ensemble\.tolerance must be greater than 0\.0; received 0"
     ):
         EnsembleSettings(tolerance=0)
-    with pytest.raises(InputError, match=r"^search\.ensemble\.blok must be a known key: .*; received 2$"):
+    with pytest.raises(
+        InputError,
+        match=r"^search\.ensemble\.blok must be a known key: .*; received 2; did you mean 'block'\?$",
+    ):
         Settings(ensemble={"blok": 2})
     with pytest.raises(InputError, match=r"^search\.ensemble must be a valid dictionary .*; received 3$"):
         Settings(ensemble=3)

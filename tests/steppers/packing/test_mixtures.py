@@ -15,7 +15,7 @@ from tests.steppers.packing.test_mechanical_contraction import (
 from tisim import Box, InputError, Particles, Scene, Simulation, run
 from tisim.analysis import near_gaps
 from tisim.analysis.packings.packed_bodies import PackedBodies
-from tisim.effects import Confinement, HardMixture
+from tisim.effects import Confinement, HardMixture, HardRods
 from tisim.geometry import BoxContainer, CylindricalContainer
 from tisim.steppers import EnergyMinimisation, MechanicalContraction, MonteCarloGrowth
 
@@ -24,32 +24,43 @@ BODIES = HardMixture(rods=SHAPES[:2], superquadrics=SHAPES[2:])
 REVISED = {"method": "revised", "volume_step": 2.0, "motion": 0.5, "attempts": 50}
 
 
-def mixed(number, fraction, stepper, *others, duration=1e6, periodic=(True, True, True)):
-    """Bodies of four shapes in turn at random places of a cubic box, where they may overlap, or on a grid for
+def mixed(number, fraction, stepper, *others, duration=1e6, periodic=(True, True, True), bodies=BODIES):
+    """Bodies of all shapes in turn at random places of a cubic box, where they may overlap, or on a grid for
     growth."""
-    kinds = np.arange(number) % 4
-    side = (sum(SHAPES[k].volume() for k in kinds) / fraction) ** (1 / 3)
+    shapes = bodies.shapes()
+    kinds = np.arange(number) % len(shapes)
+    side = (sum(shapes[k].volume() for k in kinds) / fraction) ** (1 / 3)
     places = np.random.default_rng(0).uniform(0, side, (number, 3))
     if isinstance(stepper, MonteCarloGrowth):
         places = (
             side * (np.stack(np.meshgrid(*[np.arange(5)] * 3), axis=-1).reshape(-1, 3)[:number] + 0.5) / 5
         )
     return Scene(
-        particles=Particles.of_shapes(SHAPES, places, 1.0, shape=kinds),
-        effects=[BODIES, *others],
+        particles=Particles.of_shapes(shapes, places, 1.0, shape=kinds),
+        effects=[bodies, *others],
         domain=Box(low=(0, 0, 0), high=(side, side, side), periodic=periodic),
         duration=duration,
         stepper=stepper,
     )
 
 
-def test_an_attempt_equals_its_reference():
+SPHERES_AND_CUBOIDS = HardMixture(rods=(SPHERE,), superquadrics=(CUBOID,))
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        pytest.param(BODIES, id="four shapes"),
+        pytest.param(SPHERES_AND_CUBOIDS, id="spheres and cuboids", marks=pytest.mark.slow),
+    ],
+)
+def test_an_attempt_equals_its_reference(bodies):
     """Until the first contraction, from deep overlaps on."""
-    made = mixed(80, 0.08, MechanicalContraction(method="revised"), duration=1000.0)
-    shapes = [SHAPES[k] for k in made.start()["shape"].astype(int)]
+    made, kinds = mixed(80, 0.08, MechanicalContraction(method="revised"), bodies=bodies), bodies.shapes()
+    shapes = [kinds[k] for k in made.start()["shape"].astype(int)]
     side, simulation = made.domain.high[0], Simulation(made, 1)
     simulation.load([made])
-    moved = np.zeros(4)
+    moved = np.zeros(len(kinds))
     for _ in range(3):
         before = {name: np.array(simulation.state[name]) for name in ("position", "orientation")}
         places, orientations = attempt(before, side, shapes, "revised")
@@ -58,11 +69,17 @@ def test_an_attempt_equals_its_reference():
         np.testing.assert_allclose(after["position"], places, rtol=0, atol=1e-10)
         found = Rotation.from_quat(after["orientation"], scalar_first=True).as_matrix()
         np.testing.assert_allclose(found[:, :, 2], orientations[:, :, 2], rtol=0, atol=1e-10)
-        for k in range(4):
-            change = np.abs(after["position"] - before["position"])[k::4]
+        for k in range(len(kinds)):
+            change = np.abs(after["position"] - before["position"])[k :: len(kinds)]
             moved[k] = max(moved[k], change.max())
     assert (moved > 0.01).all()
     simulation.close()
+
+
+def test_pairs_are_those_of_spheres_for_spheres_alone():
+    rods = (HardRods(rods=(SPHERE,)), HardRods(rods=(SPHERE, ROD)))
+    assert [one.spheres for one in (*rods, BODIES, SPHERES_AND_CUBOIDS)] == [True, False, False, False]
+    assert rods[0].structure() != HardRods(rods=(ROD,)).structure(), "they are not in one batch"
 
 
 def deepest(result):

@@ -44,9 +44,13 @@ class HardBodies(Shaped, Pairwise):
 
         Both are in the units of packing steppers: masses in D^3 at density 1, lengths in D of the body.
         """
-        q, length = self.turn(s, w, i), self.bounding(w, s.shape[w, i]) / self.unit(w, 0)
+        length = self.bounding(w, s.shape[w, i]) / self.unit(w, 0)
         moments = self.mass(s, w, i) * length * length * self.inertia(s, w, i)
-        return rotated(q, rotated(conjugate(q), torque) / moments)
+        spin = torque / moments
+        if ti.static(not self.spheres):
+            q = self.turn(s, w, i)
+            spin = rotated(q, rotated(conjugate(q), torque) / moments)
+        return spin
 
     @ti.func
     def mass(self, s, w, i):

@@ -43,6 +43,11 @@ class Shaped(Effect):
         """Return the shapes; the field ``shape`` of a particle is an index into them."""
         raise NotImplementedError
 
+    @property
+    def spheres(self) -> bool:
+        """Return whether all bodies are spheres, which no force between two of them turns."""
+        return False
+
     def structure(self) -> tuple[Any, ...]:
         # Rows of derived numbers have one for each shape.
         return (*super().structure(), len(self.shapes()))

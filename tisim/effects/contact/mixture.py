@@ -30,6 +30,11 @@ class Mixture(Rods, Superquadrics):
         return len(self.rods)
 
     @property
+    def spheres(self) -> bool:
+        # Its superquadrics turn, even if all its rods are spheres.
+        return False
+
+    @property
     def family(self) -> int:
         return WITH_RODS
 

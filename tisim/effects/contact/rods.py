@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Shaped
 from tisim.numerics.vectors import rotated
 from tisim.shapes.particle_shape import ParticleShape
-from tisim.shapes.rod_pairs import closest_rods
+from tisim.shapes.rod_pairs import closest_rods, closest_spheres
 from tisim.shapes.spherocylinder import SpherocylinderShape
 
 
@@ -25,6 +25,14 @@ class Rods(Shaped):
 
     def shapes(self) -> Sequence[ParticleShape]:
         return self.rods
+
+    @property
+    def spheres(self) -> bool:
+        """Return whether all rods are spheres, whose pairs take a fraction of the time of rods."""
+        return all(one.length == 0.0 for one in self.rods)
+
+    def structure(self) -> tuple[Any, ...]:
+        return (*super().structure(), self.spheres)
 
     @ti.func
     def axis(self, q):
@@ -48,15 +56,19 @@ class Rods(Shaped):
 
     @ti.func
     def between(self, s, w, i, j, q_i, q_j, separation, far):
-        return closest_rods(
-            separation,
-            self.axis(q_i),
-            self.half(s, w, i),
-            self.rod_radius(s, w, i),
-            self.axis(q_j),
-            self.half(s, w, j),
-            self.rod_radius(s, w, j),
-        )
+        radius_i, radius_j = self.rod_radius(s, w, i), self.rod_radius(s, w, j)
+        gap, normal, here, there = closest_spheres(separation, radius_i, radius_j)
+        if ti.static(not self.spheres):
+            gap, normal, here, there = closest_rods(
+                separation,
+                self.axis(q_i),
+                self.half(s, w, i),
+                radius_i,
+                self.axis(q_j),
+                self.half(s, w, j),
+                radius_j,
+            )
+        return gap, normal, here, there
 
     @ti.func
     def beside_rod(self, s, w, i, q, separation, axis, half, radius):

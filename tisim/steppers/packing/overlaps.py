@@ -141,18 +141,20 @@ class SumOverlaps(MotionSum):
     further = (INVERSE_OVERLAP,)
 
     def together(self, laws: tuple[Any, ...]) -> ListedLaws:
-        return ListedLaws(laws, 10, False)
+        return ListedLaws(laws, 4 if self.bodies.spheres else 10, False)
 
     @ti.func
     def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
         depth, counts, normal, here, there = self.overlap(w, i, j, separation)
         thickness = self.bodies.half_width(self.s, w, i) + self.bodies.half_width(self.s, w, j)
         weight = ti.select(counts, self.stepper.weight(depth / thickness), 0.0)
-        values = ti.Vector.zero(self.s.real, 10)
+        values = ti.Vector.zero(self.s.real, ti.static(4 if self.bodies.spheres else 10))
+        values[0] = ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
         push, turn_i, turn_j = weight * normal, -weight * here.cross(normal), weight * there.cross(normal)
         for k in ti.static(range(3)):
-            values[k], values[3 + k], values[6 + k] = push[k], turn_i[k], turn_j[k]
-        values[9] = ti.select(counts, 1.0 / ti.select(counts, depth, 1.0), 0.0)
+            values[1 + k] = push[k]
+            if ti.static(not self.bodies.spheres):
+                values[4 + k], values[7 + k] = turn_i[k], turn_j[k]
         return values
 
     @ti.func
@@ -167,11 +169,13 @@ class SumOverlaps(MotionSum):
 
     @ti.func
     def pair_contributions(self, values):
-        push, here, there = piece(values, 0, 3), piece(values, 3, 3), piece(values, 6, 3)
-        return (
-            ti.Vector([-push[0], -push[1], -push[2], here[0], here[1], here[2], values[9]]),
-            ti.Vector([push[0], push[1], push[2], there[0], there[1], there[2], values[9]]),
-        )
+        one, other = ti.Vector.zero(self.s.real, 7), ti.Vector.zero(self.s.real, 7)
+        for k in ti.static(range(3)):
+            one[k], other[k] = -values[1 + k], values[1 + k]
+            if ti.static(not self.bodies.spheres):
+                one[3 + k], other[3 + k] = values[4 + k], values[7 + k]
+        one[6] = other[6] = values[0]
+        return one, other
 
     @ti.func
     def finish_body(self, w, i, total):
@@ -238,7 +242,7 @@ class SumSoftOverlaps(MotionSum):
     further = (OVERLAP_ENERGY, DEEPEST_OVERLAP)
 
     def together(self, laws: tuple[Any, ...]) -> ListedLaws:
-        return ListedLaws(laws, 16, False)
+        return ListedLaws(laws, 6 if self.bodies.spheres else 12, False)
 
     @ti.func
     def compute_pair(self, laws: ti.template(), w, m, i, j, separation, distance, t):  # type: ignore[valid-type]
@@ -246,21 +250,27 @@ class SumSoftOverlaps(MotionSum):
         gap, normal, here, there = self.bodies.closest(s, w, i, j, separation, 0.0)
         size_i = self.bodies.size(s, w, i) * self.bodies.unit(w, 0)
         size_j = self.bodies.size(s, w, j) * self.bodies.unit(w, 0)
-        mean = 0.5 * (size_i + size_j)
-        depth = ti.max(-gap, 0.0) / mean
-        force_i, force_j = -depth * size_i / mean * normal, depth * size_j / mean * normal
-        turn_i, turn_j = (here / size_i).cross(force_i), (there / size_j).cross(force_j)
-        values = ti.Vector.zero(s.real, 16)
+        over = 2.0 / (size_i + size_j)
+        depth = ti.max(-gap, 0.0) * over
+        push, turn_i, turn_j = depth * normal, -depth * here.cross(normal), depth * there.cross(normal)
+        values = ti.Vector.zero(s.real, ti.static(6 if self.bodies.spheres else 12))
+        values[0], values[1], values[2] = depth, size_i * over, size_j * over
         for k in ti.static(range(3)):
-            values[k], values[3 + k] = force_i[k], turn_i[k]
-            values[8 + k], values[11 + k] = force_j[k], turn_j[k]
-        for k in ti.static((0, 8)):
-            values[k + 6], values[k + 7] = 0.25 * depth * depth, depth
+            values[3 + k] = push[k]
+            if ti.static(not self.bodies.spheres):
+                values[6 + k], values[9 + k] = over * turn_i[k], over * turn_j[k]
         return values
 
     @ti.func
     def pair_contributions(self, values):
-        return piece(values, 0, 8), piece(values, 8, 8)
+        one, other = ti.Vector.zero(self.s.real, 8), ti.Vector.zero(self.s.real, 8)
+        for k in ti.static(range(3)):
+            one[k], other[k] = -values[1] * values[3 + k], values[2] * values[3 + k]
+            if ti.static(not self.bodies.spheres):
+                one[3 + k], other[3 + k] = values[6 + k], values[9 + k]
+        one[6] = other[6] = 0.25 * values[0] * values[0]
+        one[7] = other[7] = values[0]
+        return one, other
 
     @ti.func
     def wall_term(self, w, i, depth, counts, normal, here):
