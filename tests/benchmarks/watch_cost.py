@@ -157,7 +157,7 @@ def facts_of(page: bytes) -> dict[str, Any]:
 @contextmanager
 def begun(*order: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A process, with its first line."""
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": open("/tmp/vv/err.txt","a")}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     process = subprocess.Popen([sys.executable, *order], text=True, **pipes)
     assert process.stdout
     try:

@@ -38,7 +38,8 @@ def test_a_case_has_a_scene_of_its_own_for_some_variants():
 
 
 ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pictures": (None,),
-             "spectra": (None,), "figures": ("default", None), "calibration": ("default", "", None)}  # fmt: skip
+             "spectra": (None,),
+             "figures": ("default", None), "calibration": ("default", "", None)}  # fmt: skip
 
 PACKED = ("packing", "packed_filter")
 """Cases whose starts are packings, which take long."""
