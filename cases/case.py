@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -28,6 +28,8 @@ from tisim.optimize.problem.problem import Problem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from tisim.report.spectrum import Spectrum
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,8 @@ class Case:
     problem : (size, variant) -> Problem; variants : its names, the first the default.
     calibration : (size, variant, file) -> Problem, the same problem with the measurements in a file as
     target.
-    pictures : pictures of a run drawn from its trajectory, by file name.
+    pictures : pictures of a run drawn from its trajectory, by file name. spectra : spectra of a run computed
+    from its trajectory, for its report.
     scenes : (size, seed) -> Scene of the variants that do not use ``scene``, by name.
     figures : (size, progress) -> figures, and tables as text, that need many runs; by file name.
     """
@@ -174,6 +177,7 @@ class Case:
     quantities: Callable[[Scene], tuple[Quantity, ...]] | None = None
     cost_size: str | None = None
     pictures: Callable[[Frames], Mapping[str, Figure]] | None = None
+    spectra: Callable[[Frames], Sequence[Spectrum]] | None = None
     figures: Callable[[str, Progress], Mapping[str, Figure | str]] | None = None
     calibration: Callable[[str, str, Path], Problem] | None = None
     scenes: Mapping[str, Callable[[str, int], Scene]] = field(default_factory=dict)

@@ -12,6 +12,7 @@ CASE = Case(
     check=Late("tisim.cases.vibration.checks", "check"),
     quantities=Late("tisim.cases.vibration.closed_forms", "quantities"),
     pictures=Late("tisim.cases.vibration.figures", "pictures"),
+    spectra=Late("tisim.cases.vibration.figures", "spectra"),
     figures=Late("tisim.cases.vibration.figures", "figures"),
     problem=Late("tisim.cases.vibration.problem", "problem"),
     variants=("resonate", "avoid"),

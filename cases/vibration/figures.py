@@ -24,6 +24,7 @@ from tisim.cases.vibration.response import (
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
 from tisim.plotting.style import empty, legend_above, letters, plain, quantity
+from tisim.report.spectrum import Spectrum
 
 MIN_SPECTRUM_FRAMES = 9
 """Least number of frames for a spectrum."""
@@ -67,11 +68,42 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     return {"response.png": figure}
 
 
+def spectra(trajectory: Frames) -> list[Spectrum]:
+    """Return the spectrum of the displacement of the centre of gravity, with both signs of the frequency, for
+    the report of a run; nothing for a file with fewer frames than MIN_SPECTRUM_FRAMES."""
+    if len(trajectory) < MIN_SPECTRUM_FRAMES:
+        return []
+    parameters = constants(trajectory.scene)
+    omega, lines = CentreOfGravityHistory.of(trajectory).spectrum()
+    shown = np.abs(omega) <= drawn_reach(omega, parameters)
+    expected: dict[str, float] = {}
+    if parameters:
+        slow, fast = resonances(parameters["w"], parameters["k_m"])
+        drive = parameters["omega"]
+        expected = {
+            "slow resonance": slow,
+            "fast resonance": -fast,
+            "drive": drive,
+            "drive, clockwise": -drive,
+        }
+    title = "spectrum of the displacement of the centre of gravity"
+    floor = FLOOR * float(lines[shown].max())
+    return [Spectrum(title, "m", omega[shown], lines[shown], floor, expected)]
+
+
+def drawn_reach(omega: np.ndarray, parameters: Mapping[str, float] | None) -> float:
+    """Return the largest magnitude of the angular frequencies (1/s) that are drawn."""
+    highest = float(omega.max())
+    if not parameters:
+        return highest
+    return min(highest, 3.0 * max(*resonances(parameters["w"], parameters["k_m"]), parameters["omega"]))
+
+
 def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[str, float] | None) -> None:
     """Draw amplitudes of circular motion against its angular frequency, with the expected lines."""
     omega, lines = history.spectrum()
     axis.semilogy(omega, lines, color=RUN_COLOUR, lw=1.4)
-    reach = omega.max()
+    reach = drawn_reach(omega, parameters)
     if parameters:
         slow, fast = resonances(parameters["w"], parameters["k_m"])
         marks = (
@@ -83,7 +115,6 @@ def spectrum(axis: Axes, history: CentreOfGravityHistory, parameters: Mapping[st
                 at, color=colour, ls="--" if colour == MARK_COLOUR else ":", lw=1.2, label=label, zorder=0
             )
         legend_above(axis)
-        reach = min(reach, 3.0 * max(fast, parameters["omega"]))
     axis.set_xlim(-reach, reach)
     visible_lines = lines[np.abs(omega) <= reach]
     axis.set_ylim(FLOOR * visible_lines.max(), 3 * visible_lines.max())

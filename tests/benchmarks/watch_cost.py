@@ -9,15 +9,22 @@ frames that were shown, of those that were written.
 
 With ``--search`` there is a search of 20 runs a second instead, and the last column has the designs on the
 last page, of those at the end.
+
+With ``--slowdown`` the watcher is asked for BLOCK seconds, left alone for BLOCK seconds, and so on, while a
+search computes without a pause. Printed are the processor time of the search for a run with the watcher asked
+over that without, the mean of pairs of successive blocks with its 95 % interval, the same of a trimmed mean,
+and the processor time of the watcher as a share of all cores.
 """
 
 import argparse
+import itertools
 import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.parse
 import urllib.request
@@ -28,8 +35,12 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+import numpy as np
+from scipy.stats.mstats import trimmed_mean_ci
+
 from tests.watch.conftest import Growing
 from tisim import optimize
+from tisim.analysis import Mean
 from tisim.optimize.report.search_data import read_search
 from tisim.watch.run import POLL
 
@@ -72,6 +83,73 @@ def search(folder: Path) -> None:
     problem = optimize.Problem.of_function(throw, genes, name="throw")
     print("ready", flush=True)
     optimize.run(problem, out=folder, method="random", generations=10_000)
+
+
+def computed(design: dict[str, float]) -> float:
+    """Compute for some 30 ms, and tell the time and the processor time of this process, s."""
+    values = np.linspace(0.0, design["height"], 100_000)
+    for _ in range(20):
+        values = np.sin(values) + design["width"]
+    sys.stdout.write(f"{time.monotonic()} {time.process_time()}\n")
+    sys.stdout.flush()
+    return float(values.mean())
+
+
+def compute(folder: Path) -> None:
+    """Search without a pause until the process is killed."""
+    genes = [optimize.Gene("height", "m", 1.0, 2.0), optimize.Gene("width", "m", 0.0, 1.0)]
+    problem = optimize.Problem.of_function(computed, genes, name="throw")
+    print("ready", flush=True)
+    optimize.run(problem, out=folder, method="random", generations=1_000_000)
+
+
+def ask(address: str, state: dict[str, Any]) -> None:
+    """Ask once as a page does, and for the page if it has changed."""
+    one = json.loads(answer(f"{address}news?{urllib.parse.urlencode(state)}"))
+    if one.get("changed"):
+        state["version"] = facts_of(answer(address))["version"]
+
+
+def slowdown(seconds: float, block: float) -> None:
+    """Print the slowdown of a search by a watcher that is asked, and the watcher's share."""
+    with ExitStack() as stack:
+        folder = stack.enter_context(tempfile.TemporaryDirectory())
+        searcher, _ = stack.enter_context(begun(__file__, "--compute", folder))
+        lines: list[tuple[float, float]] = []
+
+        def read() -> None:
+            assert searcher.stdout
+            for line in searcher.stdout:
+                now, used = line.split()
+                lines.append((float(now), float(used)))
+
+        threading.Thread(target=read, daemon=True).start()
+        while not any(Path(folder).glob("search.h5*")):
+            time.sleep(0.1)
+        watcher, address = stack.enter_context(begun("-m", "tisim", "watch", folder, "--no-open"))
+        state = {"version": facts_of(answer(address))["version"]}
+        ends, watched, asked = [time.monotonic()], [], []
+        while ends[-1] < ends[0] + seconds or len(asked) % 4:
+            # Asked, alone, alone, asked: a drift cancels.
+            asked.append(len(asked) % 4 in (0, 3))
+            before, end = processor_time(watcher.pid), ends[-1] + block
+            while time.monotonic() < end:
+                if asked[-1]:
+                    ask(address, state)
+                time.sleep(max(0.0, min(POLL, end - time.monotonic())))
+            watched.append(processor_time(watcher.pid) - before)
+            ends.append(time.monotonic())
+    told, polled = np.array(lines), np.array(asked)
+    inside = [told[(told[:, 0] >= a) & (told[:, 0] < b), 1] for a, b in itertools.pairwise(ends)]
+    each = np.array([(used[-1] - used[0]) / (len(used) - 1) for used in inside])
+    changes = 100 * (each[polled] / each[~polled] - 1)
+    # Other programs on the machine disturb some blocks, which a trimmed mean leaves out.
+    mean, (low, high) = Mean.of(changes), trimmed_mean_ci(changes, limits=(0.2, 0.2))
+    count, share = sum(map(len, inside)), np.array(watched)[polled].sum() / np.diff(ends)[polled].sum()
+    print(f"{polled.sum()} pairs of {block:g} s, {count} runs of {1000 * each[~polled].mean():.1f} ms")
+    print(f"processor time of a run of the search, asked over alone: {mean.value:+.2f} +- {mean.half:.2f} %")
+    print(f"without a fifth of the pairs at either end: {low:+.2f} to {high:+.2f} %")
+    print(f"processor time of the watcher while asked: {100 * share / os.cpu_count():.2f} % of all cores")
 
 
 def facts_of(page: bytes) -> dict[str, Any]:
@@ -148,11 +226,18 @@ def main() -> None:
     options.add_argument("--rate", type=float, default=2.0)
     options.add_argument("--seconds", type=float, default=120.0)
     options.add_argument("--search", action="store_true")
+    options.add_argument("--slowdown", action="store_true")
+    options.add_argument("--block", type=float, default=10.0)
     options.add_argument("--write", type=Path)
+    options.add_argument("--compute", type=Path)
     given = options.parse_args()
     sizes = [0] if given.search else given.sizes
     if given.write:
         write(given.write, sizes[0], given.rate) if sizes[0] else search(given.write)
+    if given.compute:
+        compute(given.compute)
+    if given.slowdown:
+        return slowdown(given.seconds, given.block)
     print("| particles | start | first page | answer without news | share of a core | shown |")
     print("|---|---|---|---|---|---|")
     for number in sizes:

@@ -38,6 +38,7 @@ def test_a_case_has_a_scene_of_its_own_for_some_variants():
 
 
 ARGUMENTS = {"check": (), "problem": ("default", ""), "quantities": (None,), "pictures": (None,),
+             "spectra": (None,),
              "figures": ("default", None), "calibration": ("default", "", None)}  # fmt: skip
 
 PACKED = ("packing", "packed_filter")

@@ -14,13 +14,16 @@ import tisim
 from tests.effects.contact.grains import USUAL
 from tests.files.test_growing_hdf5 import STILL
 from tests.files.test_growing_hdf5 import frame as grown
+from tests.report.conftest import growing_packing, recorded
+from tests.report.conftest import scene as empty_scene
 from tests.scenes import flow, scene
-from tisim import InputError, Material, Recording, geometry
+from tisim import InputError, Material, Open, Recording, geometry
 from tisim.effects import Granular, Servo, Translation, Walls
 from tisim.io.export import export, file_names
 from tisim.io.reader import frames
 from tisim.io.run_folder import RunFolder, write
 from tisim.io.trajectory import Trajectory
+from tisim.operators import ReflectingWalls
 from tisim.plotting.movie import movie
 
 
@@ -219,6 +222,33 @@ def test_walls_at_rest_have_one_file(tmp_path):
     assert walls == ["w_walls_00000.vtu"] * 3
     assert [name for name in file_names(file, "vtk") if "walls" in name] == ["w_walls_00000.vtu"]
     assert sorted(path.name for path in tmp_path.glob("*walls*")) == ["w_walls_00000.vtu"]
+
+
+def test_reflecting_walls_are_exported(tmp_path):
+    """A tube and a plane, among others."""
+    tube = geometry.CylindricalSurface(start=(0, 0, 0), end=(0, 0, 0.02), radius=0.004)
+    reflecting = ReflectingWalls(cylinders=[tube], planes=[geometry.Plane(point=(0, 0, 0.001))])
+    made = empty_scene(1, domain=Open(), effects=(reflecting,))
+    file = recorded(tmp_path / "t.h5", made, [{"id": [0], "position": [[0.0, 0.0, 0.005]]}] * 2)
+    _, walls = files_by_part(export(file, "vtk", tmp_path))
+    mesh = meshio.read(tmp_path / walls[0])
+    corners = mesh.points[mesh.cells[0].data]
+    flat = np.ptp(corners[..., 2], axis=1) == 0
+    np.testing.assert_allclose(corners[flat][..., 2], 0.001)
+    across = np.linalg.norm(corners[~flat][..., :2], axis=-1)
+    np.testing.assert_allclose(across, 0.004, rtol=1e-9)
+    assert np.ptp(corners[~flat][..., 2]) == pytest.approx(0.02)
+
+
+def test_the_container_of_a_packing_is_exported_and_grows(tmp_path):
+    """Without bodies, as in the second frame, its size is not known."""
+    made, states = growing_packing()
+    file = recorded(tmp_path / "t.h5", made, states)
+    _, walls = files_by_part(export(file, "vtk", tmp_path, fields=("mass",)))
+    assert len(set(walls)) == 3
+    wide = [np.ptp(meshio.read(tmp_path / name).points[:, 0]) for name in (walls[0], walls[2])]
+    np.testing.assert_allclose(wide, [0.002, 0.008])
+    assert 'NumberOfCells="0"' in (tmp_path / walls[1]).read_text()
 
 
 def test_a_body_that_forces_move_is_where_its_travel_says(tmp_path):

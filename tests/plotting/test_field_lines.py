@@ -10,7 +10,7 @@ from tests.report.conftest import record, scene
 from tisim import Box, InputError, Open
 from tisim.io.reader import frames
 from tisim.plotting.cloud import start_and_end
-from tisim.plotting.field_lines import FieldLines, dipole_field, ends, follow, lines_through
+from tisim.plotting.field_lines import FieldLines, arrowheads, dipole_field, ends, follow, lines_through
 from tisim.plotting.look import Look
 from tisim.plotting.movie import movie
 from tisim.plotting.scenery import NO_SCENERY
@@ -147,3 +147,25 @@ def test_a_movie_has_lines_if_they_are_wanted(magnetised, record, tmp_path):
             movie(sequence, tmp_path / "a.gif", look=Look(lines=lines))
         made[lines] = (tmp_path / "a.gif").read_bytes()
     assert len(made["magnetic"]) > 1.5 * len(made[None])
+
+
+def test_arrowheads_point_along_the_field():
+    """Around a wire: each tip is ahead of its barbs, at the middle of a line, and short lines have none."""
+
+    def field(r):
+        return np.stack([-r[:, 1], r[:, 0], 0 * r[:, 0]], axis=1)
+
+    lines = lines_through(field, np.array([-1.0, -1.0, -0.2]), np.array([1.0, 1.0, 0.2]))
+    barbs = arrowheads([*lines, np.array([[0.0, 0, 0], [1e-3, 0, 0]])])
+    heads = barbs.reshape(-1, 4, 2, 3)
+    assert 10 < len(heads) <= len(lines)
+    tips, behind = heads[:, 0, 0], heads[:, :, 1].mean(axis=1)
+    np.testing.assert_array_equal(heads[:, :, 0], np.repeat(tips[:, None], 4, axis=1))
+    along = field(tips) / np.linalg.norm(field(tips), axis=1, keepdims=True)
+    size = np.linalg.norm(tips - behind, axis=1)
+    cosine = ((tips - behind) * along).sum(axis=1) / size
+    assert cosine.min() > 0.9
+    assert np.ptp(size) < 1e-9
+    nearest = [min(np.linalg.norm(line - tip, axis=1).min() for line in lines) for tip in tips]
+    assert max(nearest) < 0.02
+    assert arrowheads([]).shape == (0, 2, 3)

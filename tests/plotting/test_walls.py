@@ -12,6 +12,7 @@ from tisim import Material, geometry
 from tisim.effects import Fixed, Granular, Oscillation, Rotation, Servo, Translation, Walls
 from tisim.effects.walls.placement import MARGIN, placed, placed_walls
 from tisim.geometry.tessellation import FACETS_AROUND, sharp_edges, tessellated
+from tisim.operators import ReflectingWalls
 from tisim.plotting.look import USUAL as USUAL_LOOK
 from tisim.plotting.movie import _scales
 from tisim.plotting.scenery import scenery
@@ -121,6 +122,17 @@ def test_walls_in_a_picture_are_in_place():
     ):  # fmt: skip
         walls = scenery(made, around, time, measures).walls
         np.testing.assert_allclose([one.corners[..., 2].mean() for one in walls], heights, atol=1e-12)
+
+
+def test_reflecting_walls_are_in_the_picture():
+    ball = geometry.SphericalSurface(centre=(0.5, 0.5, 0.5), radius=2.0)
+    made = among(ReflectingWalls(spheres=[ball], planes=[geometry.Plane(point=(0, 0, 0))]))
+    (wall,) = scenery(made, [made.start()], 0.0).walls
+    away = np.linalg.norm(wall.corners - 0.5, axis=2)
+    flat = (wall.corners[..., 2] == 0).all(axis=1)
+    assert flat.any()
+    np.testing.assert_allclose(away[~flat], 2.0)
+    assert size(wall.corners[~flat]) == pytest.approx(16 * np.pi, rel=2e-3)
 
 
 def test_the_container_of_a_packing_in_a_picture_grows_with_its_bodies():

@@ -27,22 +27,26 @@ def scene(n=4, **settings):
     )
 
 
+def recorded(path, of_scene, frames, measures=()):
+    """Write a trajectory of frames, each a dict of arrays (``id`` and ``position`` at least)."""
+    with Trajectory(path, [of_scene]) as file:
+        for k, given in enumerate(frames):
+            n = len(given["id"])
+            arrays = {
+                field.name: np.full(field.shape(n), 1e-3 if field.name in ("radius", "mass") else 0.0)
+                for field in recorded_fields(of_scene)
+            }
+            arrays = {name: np.asarray(given.get(name, values)) for name, values in arrays.items()}
+            file.write(0, Frame(k * 0.01, k, arrays, measures[k] if measures else {}))
+    return path
+
+
 @pytest.fixture
 def record(tmp_path):
-    """Write a trajectory of frames, each a dict of arrays (``id`` and ``position`` at least)."""
+    """Write a trajectory, as ``recorded``, into a folder of the test."""
 
     def write(of_scene, frames, name="trajectory.h5", measures=()):
-        path = tmp_path / name
-        with Trajectory(path, [of_scene]) as file:
-            for k, given in enumerate(frames):
-                n = len(given["id"])
-                arrays = {
-                    field.name: np.full(field.shape(n), 1e-3 if field.name in ("radius", "mass") else 0.0)
-                    for field in recorded_fields(of_scene)
-                }
-                arrays = {name: np.asarray(given.get(name, values)) for name, values in arrays.items()}
-                file.write(0, Frame(k * 0.01, k, arrays, measures[k] if measures else {}))
-        return path
+        return recorded(tmp_path / name, of_scene, frames, measures)
 
     return write
 
@@ -83,7 +87,8 @@ def opened(browser):
 
 @pytest.fixture
 def touching(record, rng):
-    """Grains that touch, across periodic faces too: the file, and for each frame the overlaps (m) by ids."""
+    """Grains that touch, across periodic faces too: the file, and for each frame Hertz's forces (N) by
+    ids."""
     from tisim import Material
     from tisim.effects import Granular
 
@@ -101,7 +106,10 @@ def touching(record, rng):
         apart = place[ids][:, None] - place[ids]
         depth = 4e-3 - np.linalg.norm(apart - 0.02 * np.rint(apart / 0.02), axis=2)
         pairs = np.argwhere(np.triu(depth >= 0, 1))
-        expected.append({(int(ids[i]), int(ids[j])): float(depth[i, j]) for i, j in pairs})
+        # E* = E / (2 (1 - nu^2)) of two equal materials, R* = R / 2.
+        modulus = 1e7 / (2 * (1 - 0.25**2))
+        force = 4 / 3 * modulus * np.sqrt(1e-3) * np.maximum(depth, 0) ** 1.5
+        expected.append({(int(ids[i]), int(ids[j])): float(force[i, j]) for i, j in pairs})
     return record(grains, made), expected
 
 

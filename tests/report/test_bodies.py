@@ -27,6 +27,7 @@ from tisim.geometry import (
     SphericalSurface,
     TriangulatedSurface,
 )
+from tisim.operators import ReflectingWalls
 from tisim.report.bodies import bodies, container
 from tisim.shapes import SpherocylinderShape
 from tisim.steppers import MechanicalContraction
@@ -98,6 +99,15 @@ def test_moving_walls_are_at_their_places(motion):
     for pose, time in zip(body.poses, times, strict=True):
         drawn = Turn.from_quat(pose[3:]).apply(body.mesh.vertices) + pose[:3]
         np.testing.assert_allclose(drawn, placed(motion, body.mesh.vertices, time), atol=1e-12)
+
+
+def test_reflecting_walls_are_drawn_as_others_are():
+    tube = CylindricalSurface(end=(0, 0.0, 2.0), radius=0.5)
+    made = Scene(particles=particles(1), effects=(ReflectingWalls(cylinders=[tube]),), duration=1.0)
+    (drawn,) = bodies(made, np.zeros(2), {}, LOW, HIGH)
+    assert drawn.name == "reflecting_walls"
+    assert area(drawn.mesh) == pytest.approx(2 * np.pi, rel=2e-3)
+    assert len(drawn.poses) == 0
 
 
 def test_a_servo_is_where_its_recorded_travel_puts_it():

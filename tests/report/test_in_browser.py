@@ -5,6 +5,7 @@ Playwright (the extra ``browser``) drives the chromium of the system.
 
 import csv
 import io
+import re
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from tisim.effects.walls.placement import placed_container
 from tisim.io.reader import frames
 from tisim.report.compressed_trajectory import compress
 from tisim.report.run_report import run_report
+from tisim.report.spectrum import Spectrum
 from tisim.report.view import view
 from tisim.report.viewer_data import ReportOptions
 from tisim.shapes import SpherocylinderShape, SuperquadricShape
@@ -418,6 +420,34 @@ def test_what_is_shown_can_be_saved(moving, opened):
         assert b"mass,kg" in table
 
 
+def test_a_spectrum_has_its_axis_and_the_expected_frequencies(record, opened, tmp_path):
+    omega = np.linspace(-300.0, 300.0, 601)
+    amplitudes = 2e-6 / (1 + ((omega - 100) / 5) ** 2) + 1e-12
+    one = Spectrum("spectrum of a motion", "m", omega, amplitudes, 1e-9, {"resonance": 100.0, "far": 1e4})
+    path = record(scene(1), [{"id": [0], "position": [[0.0, 0.0, 0.0]]}] * 2)
+    html = run_report(path, tmp_path / "r.html", options=ReportOptions(spectra=[one]))
+    with opened(html) as page:
+        chart = page.locator("#spectra svg.chart")
+        assert "angular frequency" in chart.text_content()
+        assert "resonance" in chart.text_content()
+        assert "far" not in chart.text_content(), "beyond the axis"
+        place = page.evaluate("report.spectra[0].x(100)")
+        drawn = [
+            float(x)
+            for x in page.locator("#spectra line.across").evaluate_all(
+                "(all) => all.map((one) => one.getAttribute('x1'))"
+            )
+        ]
+        assert drawn == pytest.approx([place])
+        with page.expect_download() as kept:
+            page.get_by_role("button", name="Save spectrum of a motion as CSV").click()
+        head, *rows = kept.value.path().read_text().splitlines()
+    assert head == "angular frequency (1/s),spectrum of a motion (m)"
+    values = [row.split(",") for row in rows]
+    peak = max(values, key=lambda row: float(row[1] or "nan") if row[1] not in ("", "null") else 0.0)
+    assert [float(one) for one in peak] == pytest.approx([100.0, 2e-6], rel=1e-5)
+
+
 def test_a_click_on_a_curve_jumps_to_its_time(moving, opened):
     html, *_ = moving
     with opened(html) as page:
@@ -445,14 +475,35 @@ def test_contacts_are_those_of_the_file(opened, tmp_path, touching):
     html = run_report(path, tmp_path / "r.html", options=ReportOptions())
     with opened(html) as page:
         seen = page.evaluate(
-            "report.trajectory.times.map((_, f) => { const all = []; report.network.each(f, (i, j, depth) =>"
-            " all.push([report.trajectory.id(f, i), report.trajectory.id(f, j), depth])); return all; })"
+            "report.trajectory.times.map((_, f) => { const all = []; report.network.each(f, (i, j, force) =>"
+            " all.push([report.trajectory.id(f, i), report.trajectory.id(f, j), force])); return all; })"
         )
-    largest = max(depth for pairs in expected for depth in pairs.values())
+        page.get_by_label("contacts", exact=True).check()
+        (usual,) = page.evaluate("report.player.viewer.networks().map((one) => one.usual)")
+        legend = page.inner_text(".legend")
+        lines = page.evaluate("(report.player.go(2), report.player.viewer.contactLines.count)")
+        strongest = max(expected[2], key=expected[2].get)
+        page.get_by_label("Particle id").fill(str(strongest[0]))
+        page.keyboard.press("Enter")
+        told = page.inner_text(".inspector table")
+        with page.expect_download() as kept:
+            page.get_by_role("button", name="Save the contacts of this frame as CSV").click()
+        (head, first, *rest) = kept.value.path().read_text().splitlines()
+    every = [force for pairs in expected for force in pairs.values()]
+    assert usual == pytest.approx(np.percentile(every, 99), rel=1e-6)
     for rows, pairs in zip(seen, expected, strict=True):
         assert {tuple(sorted(row[:2])) for row in rows} == set(pairs)
-        for a, b, depth in rows:
-            assert depth == pytest.approx(pairs[min(a, b), max(a, b)], abs=0.5001 * largest / 255)
+        for a, b, force in rows:
+            root = pairs[min(a, b), max(a, b)] ** 0.5
+            assert force**0.5 == pytest.approx(root, abs=0.5001 * max(every) ** 0.5 / 255)
+    assert re.search(r"contact force \((m|\u00b5|)N\)", legend)
+    assert lines == len(expected[2])
+    assert re.search(rf"force with {strongest[1]}\s", told)
+    assert re.search(rf"contacts\s+{sum(strongest[0] in pair for pair in expected[2])}\b", told)
+    assert head == "id,other id,normal force (N)"
+    assert {int(one) for one in first.split(",")[:2]} == set(strongest)
+    assert float(first.split(",")[2]) == pytest.approx(expected[2][strongest], rel=0.02)
+    assert len(rest) == len(expected[2]) - 1
 
 
 def test_runs_that_begin_or_stay_empty_are_shown(record, opened, tmp_path):

@@ -54,6 +54,23 @@ def test_its_own_browser_gets_the_page(server, asked):
     assert asked == [{}, {"after": "3", "key": "a"}]
 
 
+def test_a_fault_of_a_page_is_an_answer_and_is_reported(capfd):
+    """A browser that closes its connection is no fault."""
+
+    def page(query):
+        raise {"a": KeyError("lost"), "b": ConnectionResetError("gone")}[query["of"]]
+
+    with WatchServer({"": page}) as running:
+        for of in "ab":
+            status, _, content = request(running, f"/{running.token}/?of={of}")
+            assert status == HTTPStatus.INTERNAL_SERVER_ERROR
+            assert b"lost" not in content
+    told = capfd.readouterr().err
+    assert "KeyError: 'lost'" in told
+    assert "ConnectionResetError: gone" not in told
+    assert running.token not in told
+
+
 def test_it_listens_on_the_loopback_alone(server):
     assert server.socket.getsockname() == (LOOPBACK, server.server_port)
     assert server.address == f"http://127.0.0.1:{server.server_port}/{server.token}/"

@@ -28,12 +28,13 @@ from tisim.files.output_folder import resumes
 from tisim.streams import say
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.figure import Figure
 
     from tisim.io.reader import Frames
     from tisim.plotting.look import Look
+    from tisim.report.spectrum import Spectrum
 
 File = Annotated[
     Path,
@@ -126,6 +127,14 @@ def case_pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
     case = every().get(trajectory.scene.name)
     return case.pictures(trajectory) if case and case.pictures else {}
+
+
+def case_spectra(trajectory: Frames) -> Sequence[Spectrum]:
+    """Return the spectra that the case of a run computes of it."""
+    from tisim.cases.case import every
+
+    case = every().get(trajectory.scene.name)
+    return case.spectra(trajectory) if case and case.spectra else ()
 
 
 def figures(

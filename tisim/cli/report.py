@@ -11,7 +11,7 @@ import typer
 
 from tisim.backend import runtime
 from tisim.cli import targets
-from tisim.cli.inspect import Lines, World, case_pictures, print_missing, trajectory_file
+from tisim.cli.inspect import Lines, World, case_pictures, case_spectra, print_missing, trajectory_file
 from tisim.cli.options import Overwrite, Plugins, given_options, nameable
 from tisim.console import err, shown_progress
 from tisim.errors import InputError, must
@@ -169,9 +169,10 @@ def _run(
             name.removesuffix(".png").replace("_", " "): pictures.image(mark_missing(figure, trajectory))
             for name, figure in found.items()
         }
+        spectra = case_spectra(trajectory) if len(trajectory) > 1 else ()
         print_missing(trajectory.missing)
     rows = read_checks(checks) if checks else ()
-    options = ReportOptions(limit, fields or None, contacts, drawn, rows, lines)
+    options = ReportOptions(limit, fields or None, contacts, drawn, spectra, rows, lines)
     output_folder.claim(path.parent, (path.name,), overwrite)
     with err().status("writing"):
         run_report(file, path, world, options)

@@ -5,15 +5,13 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from tisim.domains.domain import Domain
-from tisim.effects.walls.placement import PlacedWalls, placed_walls
-from tisim.effects.walls.walls import Walls
+from tisim.effects.walls.placement import PlacedWalls, names_of_surfaces, placed_surfaces
 from tisim.engine.assembly import units
 from tisim.errors import InputError, must
 from tisim.files.atomic import replace_file, replacing, temporary_name
@@ -55,12 +53,9 @@ def export(
     for world in range(count):
         name = _world_name(file, world, count)
         with frames(file, world) as trajectory:
-            frames_to_write = _with_progress(trajectory, progress, world, count, fields)
-            paths.append(
-                _vtk(trajectory, frames_to_write, folder, name)
-                if kind == "vtk"
-                else _xyz(trajectory, frames_to_write, folder, name)
-            )
+            frames_to_write = _with_progress(trajectory, progress, world, count)
+            write = _vtk if kind == "vtk" else _xyz
+            paths.append(write(trajectory, frames_to_write, folder, name, fields))
     return paths[0]
 
 
@@ -97,17 +92,23 @@ def file_names(file: Path, kind: str) -> list[str]:
 
 
 def _with_progress(
-    trajectory: Frames, progress: Callable[[float], None], world: int, worlds: int, fields: Sequence[str]
+    trajectory: Frames, progress: Callable[[float], None], world: int, worlds: int
 ) -> Iterator[Frame]:
-    """Yield the frames of a world with some fields; call ``progress`` after each with the finished fraction
-    of all worlds."""
+    """Yield the frames of a world; call ``progress`` after each with the finished fraction of all worlds."""
     for k, frame in enumerate(trajectory):
-        kept = {"position", *fields} if fields else frame.arrays
-        yield replace(frame, arrays={name: values for name, values in frame.arrays.items() if name in kept})
+        yield frame
         progress((world + (k + 1) / len(trajectory)) / worlds)
 
 
-def _vtk(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str) -> Path:
+def _chosen(arrays: Arrays, fields: Sequence[str]) -> Arrays:
+    """Return the position and some other quantities; all of them for no ``fields``."""
+    kept = {"position", *fields} if fields else arrays.keys()
+    return {name: values for name, values in arrays.items() if name in kept}
+
+
+def _vtk(
+    trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str, fields: Sequence[str]
+) -> Path:
     """Write a .vtu of the particles of each frame, and one of the walls, which all frames share if the walls
     are at rest."""
     walls = _frames_of_walls(trajectory)
@@ -115,7 +116,7 @@ def _vtk(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
     datasets = ElementTree.SubElement(collection, "Collection")
     for k, frame in enumerate(frames_to_write):
         frame_file = _frame_name(name, k)
-        replace_file(folder / frame_file, _vtu(frame.arrays))
+        replace_file(folder / frame_file, _vtu(_chosen(frame.arrays, fields)))
         _dataset(datasets, frame.time, "0", frame_file)
         if walls:
             own = _frame_name(f"{name}_walls", walls[min(k, len(walls) - 1)])
@@ -141,16 +142,21 @@ def _dataset(collection: ElementTree.Element, time: float, part: str, file: str)
 def _frames_of_walls(trajectory: Frames) -> list[int]:
     """Return the frames with a file of walls: none without walls, and the first alone if they are at rest."""
     frame = trajectory[0] if len(trajectory) else None
-    if frame is None or not any(isinstance(effect, Walls) for effect in trajectory.scene.effects):
+    names = names_of_surfaces(trajectory.scene)
+    if frame is None or not names:
         return []
-    return [0] if all(one.fixed for one in _walls(trajectory, frame)) else list(range(len(trajectory)))
+    walls = _walls(trajectory, frame)
+    # The container of a packing is known from the first frame with bodies.
+    fixed = len(walls) == len(names) and all(one.fixed for one in walls)
+    return [0] if fixed else list(range(len(trajectory)))
 
 
 def _walls(trajectory: Frames, frame: Frame) -> list[PlacedWalls]:
-    """Return the walls of a frame; planes end slightly beyond the particles and other walls."""
-    place, scene = frame.arrays["position"], trajectory.scene
+    """Return the walls of a frame, and its container; planes end slightly beyond the particles and other
+    walls."""
+    place = frame.arrays["position"]
     place = place[np.isfinite(place).all(axis=1)]
-    return placed_walls(scene.effects, frame.time, place, frame.measures)
+    return placed_surfaces(trajectory.scene, frame.time, place, frame.measures, frame.arrays)
 
 
 def _vtu(arrays: Arrays) -> bytes:
@@ -164,20 +170,17 @@ def _vtu(arrays: Arrays) -> bytes:
 def _vtu_of_walls(trajectory: Frames, frame: Frame) -> bytes:
     """Return the walls of one frame as an unstructured grid of triangles.
 
-    The cell data are ``wall``, the index of the walls in the scene, and ``material``, the index
-    of their material.
+    The cell data are ``wall``, the index of the walls among all in the scene, and ``material``, the index
+    of their material, 0 without one.
     """
     scene, bodies = trajectory.scene, _walls(trajectory, frame)
-    effects = [effect for effect in scene.effects if isinstance(effect, Walls)]
-    labels, materials = [one.label for one in effects], list(scene.materials)
+    names, materials = names_of_surfaces(scene), list(scene.materials)
     counts = [len(one.triangles) for one in bodies]
-    which = np.repeat(np.array([labels.index(one.name) for one in bodies], np.int32), counts)
-    material_of = np.array(
-        [materials.index(one.material) if one.material in materials else 0 for one in effects], np.int32
-    )
+    which = np.repeat(np.array([names.index(one.name) for one in bodies], np.int32), counts)
+    material = [materials.index(one.material) if one.material in materials else 0 for one in bodies]
     points = np.concatenate([np.empty((0, 3)), *(one.triangles.reshape(-1, 3) for one in bodies)])
     corners = np.arange(len(points)).reshape(-1, 3)
-    data = {"wall": which, "material": material_of[which]}
+    data = {"wall": which, "material": np.repeat(np.array(material, np.int32), counts)}
     return _grid(points, corners, _TRIANGLE, "CellData", data, {"Scalars": "wall"})
 
 
@@ -228,7 +231,9 @@ def _xml(root: ElementTree.Element) -> bytes:
     return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str) -> Path:
+def _xyz(
+    trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, name: str, fields: Sequence[str]
+) -> Path:
     """Write extended XYZ: for each frame the number of particles, a line of keys, and one line per particle.
 
     The species of a particle is its material if the scene has several, and otherwise X, which is not an
@@ -239,12 +244,13 @@ def _xyz(trajectory: Frames, frames_to_write: Iterator[Frame], folder: Path, nam
     temporary = path.with_name(temporary_name(path.name))
     with replacing(path, temporary), temporary.open("w", encoding="utf-8") as file:
         for frame in frames_to_write:
-            columns, properties = _columns(frame.arrays)
+            arrays = _chosen(frame.arrays, fields)
+            columns, properties = _columns(arrays)
             box = _lattice(trajectory.scene.domain, frame.time)
-            keys = f'Properties={properties} Units="{_units(trajectory, frame.arrays)}" '
+            keys = f'Properties={properties} Units="{_units(trajectory, arrays)}" '
             keys += f"Time={frame.time!r} Step={frame.step}"
             file.write(f"{len(columns[0])}\n{box}{keys}\n")
-            species = _species(trajectory, frame.arrays)
+            species = _species(trajectory, arrays)
             rows = zip(species, zip(*columns, strict=True), strict=True)
             file.writelines(f"{name} {' '.join(map(repr, row))}\n" for name, row in rows)
     return path

@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import Constraint, SceneParts
+from tisim.effects.walls.placement import WallBody, wall_body
 from tisim.errors import Words, must
 from tisim.geometry.cylinder import CylindricalSurface
 from tisim.geometry.plane import Plane
@@ -129,3 +130,8 @@ class ReflectingWalls(Operator):
         back."""
         size = out.norm()
         return size - radius, -out / ti.select(size > 0.0, size, 1.0)
+
+
+@wall_body.register
+def _(effect: ReflectingWalls) -> WallBody:
+    return WallBody(effect.label, effect.planes, (*effect.cylinders, *effect.spheres))

@@ -34,6 +34,12 @@ LINE_STEPS = 160
 ROOM_FOR_LINES = 0.15
 """The box of lines in open space is larger than the one around particles and magnets by this, relative to its
 diagonal, on each side."""
+ARROW_LENGTH, ARROW_SLOPE = 0.03, 0.35
+"""Length of an arrowhead relative to the diagonal of a box around all lines, and half its width over its
+length."""
+ARROW_PLACES = (0.35, 0.5, 0.65)
+"""Places of the arrowheads of successive lines, as fractions of their lengths, so that they are not in one
+plane."""
 SUMMED_PAIRS = 2_000_000
 """Pairs of a point and a dipole that are summed at a time."""
 
@@ -194,7 +200,33 @@ class FieldLines:
         corners = [one.centre + sign * one.sizes()[:, None] for one in around.solids for sign in (-1, 1)]
         found = self.lines(state, time, np.concatenate([around.points, *corners]))
         colour = np.array(LINE_COLOURS[self.name])
-        return replace(around, edges=(*around.edges, DrawnLines.of(ends(found), colour, LINE_WIDTH)))
+        pieces = np.concatenate([ends(found), arrowheads(found)])
+        return replace(around, edges=(*around.edges, DrawnLines.of(pieces, colour, LINE_WIDTH)))
+
+
+def arrowheads(lines: list[np.ndarray]) -> np.ndarray:
+    """Return arrowheads that show the direction of lines, one on each that is long enough: four barbs as
+    pairs of points (m), the tip first, shape (barbs, 2, 3).
+
+    lines : points (m) in the direction of the field, shape (k, 3) each.
+    """
+    barbs = [np.empty((0, 2, 3))]
+    if lines:
+        every = np.concatenate(lines)
+        length = ARROW_LENGTH * float(np.linalg.norm(np.ptp(every, axis=0)))
+    for number, line in enumerate(lines):
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        if along[-1] < 3 * length:
+            continue
+        at = ARROW_PLACES[number % len(ARROW_PLACES)] * along[-1]
+        tip, tail = (np.array([np.interp(s, along, x) for x in line.T]) for s in (at + length, at))
+        way = (tip - tail) / np.linalg.norm(tip - tail)
+        aside = np.cross(way, np.eye(3)[np.argmin(np.abs(way))])
+        aside *= ARROW_SLOPE * length / np.linalg.norm(aside)
+        across = np.cross(way, aside)
+        for off in (aside, -aside, across, -across):
+            barbs.append(np.stack([tip, tip - length * way + off])[None])
+    return np.concatenate(barbs)
 
 
 def ends(lines: list[np.ndarray]) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tisim.effects.walls.placement import placed_container, placed_walls
+from tisim.effects.walls.placement import placed_surfaces
 from tisim.geometry.tessellation import BOX_EDGES, box_corners
 from tisim.plotting.image import extent_of, window_of
 from tisim.plotting.look import USUAL, Look
@@ -91,9 +91,7 @@ def scenery(
     """
     box, bodies = box_scenery(*scene.domain.bounds()), _bodies(scene)
     around = np.concatenate([box.points, *_extents(bodies), *_extents_of_grains(states)])
-    placed = placed_walls(scene.effects, time, around, measures, FAR)
-    if now is not None and (container := placed_container(scene, now)) is not None:
-        placed.append(container)
+    placed = placed_surfaces(scene, time, around, measures, now, FAR)
     each = [box, *(wall_scenery(one.triangles, one.edges) for one in placed)]
     walls = tuple(part for one in each for part in one.walls)
     edges = tuple(part for one in each for part in one.edges)

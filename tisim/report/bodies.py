@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tisim.effects.walls.placement import MARGIN, placed, placed_container
+from tisim.effects.walls.placement import MARGIN, WallBody, placed, placed_container, wall_body
 from tisim.effects.walls.servo import Servo
-from tisim.effects.walls.walls import Walls
 from tisim.geometry.tessellation import bounded_planes, box_corners, fan, sharp_edges, tessellated
 from tisim.scene.scene import Scene
 from tisim.sources.magnetic.cylinder_body import Cylinder
@@ -125,18 +124,16 @@ def bodies(
     """
     margin = MARGIN * float(np.linalg.norm(high - low))
     box, found = box_corners(low - margin, high + margin), []
-    for walls in (effect for effect in scene.effects if isinstance(effect, Walls)):
-        shapes = [shape for name, _ in walls.lists() for shape in getattr(walls, name)]
-        shapes += [walls.surface] if walls.surface else []
-        parts = [tessellated(shape) for shape in shapes]
+    for walls in filter(None, map(wall_body, scene.effects)):
+        parts = [tessellated(shape) for shape in walls.shapes]
         parts += [fan(polygon) for polygon in bounded_planes(walls.planes, box)]
         lines = [sharp_edges(part) for part in parts]
         mesh = Mesh.of(
             np.concatenate([np.empty((0, 3, 3)), *parts]), np.concatenate([np.empty((0, 2, 3)), *lines])
         )
-        body = DrawnBody(walls.label, mesh)
+        body = DrawnBody(walls.name, mesh)
         if walls.motion.moves:
-            body.poses = _poses(walls, times, travel.get(walls.label))
+            body.poses = _poses(walls, times, travel.get(walls.name))
         found.append(body)
     return found
 
@@ -161,7 +158,7 @@ def container(scene: Scene, states: Iterable[Mapping[str, np.ndarray]]) -> Drawn
     return body
 
 
-def _poses(walls: Walls, times: np.ndarray, travel: np.ndarray | None) -> np.ndarray:
+def _poses(walls: WallBody, times: np.ndarray, travel: np.ndarray | None) -> np.ndarray:
     """Return the pose of a wall at each time, shape (times, 7)."""
     motion, still = walls.motion, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     poses = np.tile(still, (len(times), 1))

@@ -23,6 +23,7 @@ from tisim.reading import read
 from tisim.report import tables
 from tisim.report.columns import Column
 from tisim.report.compressed_trajectory import CompressedTrajectory
+from tisim.report.contact_network import ContactNetwork
 from tisim.report.kept_frames import KeptFrames
 from tisim.report.page import Page, Section, copied_text, picture, table
 from tisim.report.viewer_data import ReportOptions, viewer_data
@@ -103,11 +104,15 @@ def run_page(
         state=state,
         verdict=verdict,
         summary=summary(ends, len(data.trajectory.times), count, (times[0], times[-1])),
-        facts=data.facts | {"series": {"times": tables.digits(times), "curves": panels}},
+        facts=data.facts
+        | {
+            "series": {"times": tables.digits(times), "curves": panels},
+            "spectra": [one.facts() for one in options.spectra],
+        },
         recording=data.recording,
         notices=[*sentences, *data.notices],
         sections=list(_sections(scene, result, (first, last), options)),
-        footer=[rounding(data.trajectory), _versions(result)],
+        footer=[rounding(data.trajectory, data.network), _versions(result)],
     )
 
 
@@ -147,7 +152,8 @@ def _sections(
     scene: Scene, result: Result | None, states: tuple[Arrays, Arrays], options: ReportOptions
 ) -> list[Section]:
     """Return the sections below the view."""
-    happened = f'<div id="curves"></div>\n<div id="numbers">{numbers(result, states)}</div>'
+    spectra = '<h3>Spectra</h3>\n<div id="spectra"></div>\n' if options.spectra else ""
+    happened = f'<div id="curves"></div>\n{spectra}<div id="numbers">{numbers(result, states)}</div>'
     sections = [
         Section("happened", "What happened", happened),
         Section("asked", "What was asked", _asked(scene)),
@@ -240,7 +246,7 @@ def _setting_row(row: Sequence[str], off: bool = False) -> str:
     )
 
 
-def rounding(trajectory: CompressedTrajectory) -> str:
+def rounding(trajectory: CompressedTrajectory, network: ContactNetwork | None = None) -> str:
     """Return sentences about the rounding of the quantities shown."""
     position = trajectory.column("position")
     others = [one for one in trajectory.columns if one.name not in ("id", "position", "orientation", "shape")]
@@ -248,6 +254,11 @@ def rounding(trajectory: CompressedTrajectory) -> str:
     rest = f" Rounding of the colours: {'; '.join(sentences)}." if sentences else ""
     half = 0.5 * np.array(position.scale.step) * 2**position.scale.unused
     along = ", ".join(f"{axis} {size:.2g} m" for axis, size in zip("xyz", half, strict=True))
+    if network is not None and network.usual > 0:
+        rest += (
+            " Contact forces are the normal forces of the contact laws at the overlaps of a frame, without "
+            f"damping and friction, to within {network.rounding():.2g} N, and closer if they are weaker."
+        )
     return f"Positions are shown to within {along}, of the image inside a periodic box.{rest}"
 
 

@@ -8,7 +8,7 @@ from matplotlib import colormaps
 from tisim.effects.walls.confinement import confinement
 from tisim.plotting.bodies import shapes_of
 from tisim.plotting.cloud import gravity
-from tisim.plotting.field_lines import LINE_COLOURS, FieldLines, ends
+from tisim.plotting.field_lines import LINE_COLOURS, FieldLines, arrowheads, ends
 from tisim.report import bodies
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence
 from tisim.shapes.particle_shape import ParticleShape
@@ -81,7 +81,8 @@ def _field_lines(
     with FieldLines(sequence.scene, name) as field:
         found = field.lines(sequence[last].arrays, time, around)
     colour = [round(255 * part) for part in LINE_COLOURS[name]]
-    return {"name": name, "time": time, "colour": colour, "ends": bodies.digits(ends(found))}
+    pieces = np.concatenate([ends(found), arrowheads(found)])
+    return {"name": name, "time": time, "colour": colour, "ends": bodies.digits(pieces)}
 
 
 def _within(points: np.ndarray, box: tuple[np.ndarray, np.ndarray], margin: float) -> bool:

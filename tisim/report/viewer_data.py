@@ -12,6 +12,7 @@ from tisim.errors import must
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence, compress
 from tisim.report.contact_network import ContactNetwork, contact_network, has_contacts
 from tisim.report.scenery import colour_maps, scenery
+from tisim.report.spectrum import Spectrum
 
 SIZE_LIMIT = 15.0
 """Default for the largest size of a report, MB (10^6 bytes)."""
@@ -26,7 +27,7 @@ class ReportOptions:
     limit : largest size of the file, MB. Frames are left out until it is kept, and the page says so.
     fields : quantities of the particles for colours; None for all.
     contacts : whether to store the contacts of grains.
-    pictures : further pictures as PNG, by title.
+    pictures : further pictures as PNG, by title. spectra : of a quantity of the run.
     checks : rows of text of a table of checks, from ``read_checks``.
     lines : a field whose lines in the last frame are shown: "magnetic", "electric" or "flow"; None for none.
     logarithmic : whether quantities whose values spread over decades have logarithmic scales of colours.
@@ -36,6 +37,7 @@ class ReportOptions:
     fields: Sequence[str] | None = None
     contacts: bool = True
     pictures: Mapping[str, bytes] = field(default_factory=dict)
+    spectra: Sequence[Spectrum] = ()
     checks: Sequence[Sequence[str]] = ()
     lines: str | None = None
     logarithmic: bool = True
@@ -49,6 +51,7 @@ class ViewerData:
     """The data of a viewer.
 
     facts : plain data. recording : the compressed frames, one column after another, and the contacts.
+    network : these contacts; None without any.
     notices : sentences about frames, particles and contacts that are left out.
     """
 
@@ -56,6 +59,7 @@ class ViewerData:
     facts: dict[str, Any]
     recording: bytes
     notices: Sequence[str] = ()
+    network: ContactNetwork | None = None
 
 
 def viewer_data(sequence: FrameSequence, options: ReportOptions, reserved: float) -> ViewerData:
@@ -65,7 +69,7 @@ def viewer_data(sequence: FrameSequence, options: ReportOptions, reserved: float
     """
     trajectory, network, notices = recording(sequence, options, reserved)
     facts, data = player_facts(sequence, trajectory, network, options.lines)
-    return ViewerData(trajectory, facts | {"maps": colour_maps()}, data, notices)
+    return ViewerData(trajectory, facts | {"maps": colour_maps()}, data, notices, network)
 
 
 def player_facts(

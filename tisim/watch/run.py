@@ -210,7 +210,7 @@ class WatchedRun(Watched):
             for curve in panel["curves"]:
                 curve["values"] = curve["values"][1:]
         facts["series"] = {"times": tables.digits(times[1:]), "curves": panels}
-        return facts, recording, rounding(trajectory)
+        return facts, recording, rounding(trajectory, network)
 
     def _file(self) -> Path | None:
         """Return the trajectory, or else the result; None if there is neither."""

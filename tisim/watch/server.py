@@ -16,6 +16,7 @@ import contextlib
 import http.server
 import secrets
 import socket
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -112,7 +113,9 @@ class WatchServer(http.server.ThreadingHTTPServer):
         self.server_name, self.server_port = LOOPBACK, self.server_address[1]
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Ignore a browser that has closed its connection."""
+        """Ignore a browser that has closed its connection; report any other error on standard error."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -122,7 +125,11 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         refusal = self._refusal()
-        answer = None if refusal else self._answer()
+        try:
+            answer = None if refusal else self._answer()
+        except Exception:
+            self.send_error(HTTPStatus.INTERNAL_SERVER_ERROR)
+            raise
         if answer is None:
             self.send_error(refusal or HTTPStatus.NOT_FOUND)
             return

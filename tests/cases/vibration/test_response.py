@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import tisim
 from tisim.cases.vibration import scene as vibration
 from tisim.cases.vibration.closed_forms import constants, response
 from tisim.cases.vibration.figures import (
@@ -24,7 +25,11 @@ from tisim.cases.vibration.response import (
     slow_scenes,
     vertex,
 )
+from tisim.cli.inspect import case_spectra
 from tisim.effects import Gravity
+from tisim.io.reader import frames
+from tisim.report import run_report
+from tisim.report.viewer_data import ReportOptions
 
 CONSTANTS = {"w": vibration.CYCLOTRON, "k_m": vibration.STIFFNESS / vibration.MASS,
              "push": vibration.CHARGE * vibration.FIELD / vibration.MASS}  # fmt: skip
@@ -122,3 +127,24 @@ def test_resonance_curve_of_runs_follows_the_closed_form():
     rows = table(("one", slow), ("two", fast)).splitlines()
     assert len(rows) == 1 + 9 + 9
     assert rows[1].split(",")[0] == "one"
+
+
+def test_the_spectrum_of_a_report_has_the_lines_of_the_closed_form(tmp_path):
+    """Of a recorded run; a page shows it with its units and the expected frequencies."""
+    driven = vibration.scene(0.9 * FAST / vibration.CYCLOTRON, "none", 0.4, sites=1, observed=True)
+    path = tmp_path / "trajectory.h5"
+    tisim.run(driven, record=tisim.Recording(path, frames=600))
+    with frames(path) as trajectory:
+        (one,) = case_spectra(trajectory)
+    for name, expected in (("fast resonance", -FAST), ("drive", 0.9 * FAST)):
+        assert one.expected[name] == pytest.approx(expected, rel=1e-6)
+        near = np.abs(one.omega - expected) < 40
+        assert one.omega[near][one.amplitudes[near].argmax()] == pytest.approx(expected, abs=3.0)
+    facts = one.facts()
+    values = [value for value in facts["curves"][0]["values"] if value is not None]
+    assert len(facts["omega"]) <= 2000
+    assert max(values) == pytest.approx(one.amplitudes.max(), rel=1e-6), "thinning keeps the peak"
+    assert min(values) >= one.floor
+    page = run_report(path, tmp_path / "r.html", options=ReportOptions(spectra=[one])).read_text()
+    assert '<div id="spectra">' in page
+    assert facts["unit"] == "m"

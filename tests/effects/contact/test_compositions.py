@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from tests.effects.contact.compositions import LAWS, TWO, grains, heap
+from tests.effects.contact.compositions import LAWS, TWO, grains, heap, loaded
 from tests.effects.contact.grains import reference, run
 from tests.effects.contact.test_granular_impacts import couple_energies
 from tests.scenes import by_id
+from tisim.analysis.beds import contacts
+from tisim.report.contact_network import normal_forces
 
 # Grains overlap deeply at the start here, on purpose.
 pytestmark = [
@@ -33,6 +35,30 @@ def test_steps_equal_the_reference(name, rng):
                     state[field], values, rtol=0, atol=1e-11 * np.abs(values).max(), err_msg=field
                 )
             assert steps == 1 or min(known.sliding, known.sticking) > 300
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_normal_forces_in_numpy_are_those_of_grains_at_rest(name, rng):
+    """Their sum on each grain, at the start, is the force that the kernel has summed."""
+    n, (soft, hard) = 40, TWO[name]
+    radius = rng.uniform(0.1, 0.3, n)
+    setup = grains(
+        name, rng.uniform(0, 1.0, (n, 3)), np.zeros((n, 3)), radius=radius, mass=radius**3,
+        first=soft, second=hard, material=np.arange(n) % 2,
+    )  # fmt: skip
+    simulation = loaded([setup])
+    simulation.first.advance(1)
+    order = np.argsort(simulation.s.read("id")[0, :n])
+    summed, state = simulation.s.read("force")[0, :n][order], setup.start()
+    i, j = contacts(state["position"], radius).T
+    apart = state["position"][j] - state["position"][i]
+    distance = np.linalg.norm(apart, axis=1)
+    force = normal_forces(setup.acting(), state, i, j, radius[i] + radius[j] - distance)
+    along, expected = (force / distance)[:, None] * apart, np.zeros((n, 3))
+    np.add.at(expected, i, -along)
+    np.add.at(expected, j, along)
+    assert len(i) > 30
+    np.testing.assert_allclose(summed, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 def couples(name, rng, each=16, **more):

@@ -6,6 +6,7 @@ import pytest
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, pairs
 from tests.scenes import scene
 from tisim.effects import Contact, ContactBond, ContactDissipation, ContactFriction, ContactSoftening, Hertz
+from tisim.report.contact_network import normal_forces
 
 # Grains overlap deeply at the start here, on purpose.
 pytestmark = pytest.mark.filterwarnings("ignore::tisim.errors.StartWarning")
@@ -156,6 +157,17 @@ def test_contact_equals_its_numpy_reference(name, rng):
         assert min(counts["slips"], counts["sticks"]) > 40
     if ContactBond in kinds:
         assert 40 < counts["bonded"] < counts["touch"] - 40
+
+
+@pytest.mark.parametrize("kinds", [(Contact, ContactSoftening), (Hertz,)])
+def test_normal_forces_in_numpy_equal_the_reference(kinds, rng):
+    setup = heap(rng, kinds)
+    state = setup.start()
+    reference = Reference(setup, state)
+    i, j = np.nonzero(np.triu(reference.touch))
+    force = normal_forces(setup.acting(), state, i, j, reference.delta[i, j])
+    assert len(force) > 10
+    np.testing.assert_allclose(force, reference.sizes()[i, j], rtol=1e-9)
 
 
 def rubbing(contact, **friction):

@@ -51,6 +51,19 @@ class CapillaryBridge(GranularContact):
         line = 2 * math.pi * self.surface_tension * math.cos(self.contact_angle)
         return [*super().values(), line, (1 + self.contact_angle / 2) * self.volume ** (1 / 3)]
 
+    def normal_force(
+        self,
+        state: Mapping[str, np.ndarray],
+        i: np.ndarray,
+        j: np.ndarray,
+        overlap: np.ndarray,
+        effects: Sequence[Effect],
+    ) -> np.ndarray:
+        a, b = state["radius"][i].astype(float), state["radius"][j].astype(float)
+        line = 2 * math.pi * self.surface_tension * math.cos(self.contact_angle)
+        pull: np.ndarray = line * (2 * a * b / (a + b))
+        return -pull
+
     @ti.func
     def reach(self, s, w, i):
         return self.rupture(w)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import parameter
+from tisim.effects.base import Effect, parameter
 from tisim.effects.contact.normal import NormalContact, overlap
 
 
@@ -25,8 +27,23 @@ class Hertz(NormalContact):
     poisson: float = parameter("", "Poisson's ratio nu of the material", examples=[0.25], gt=-1, le=0.5)
 
     def push(self, radius: float, overlap: np.ndarray) -> np.ndarray:
+        return self._push(radius / 2, overlap)
+
+    def normal_force(
+        self,
+        state: Mapping[str, np.ndarray],
+        i: np.ndarray,
+        j: np.ndarray,
+        overlap: np.ndarray,
+        effects: Sequence[Effect],
+    ) -> np.ndarray:
+        a, b = state["radius"][i].astype(float), state["radius"][j].astype(float)
+        return self._push(a * b / (a + b), overlap)
+
+    def _push(self, reduced: float | np.ndarray, overlap: np.ndarray) -> np.ndarray:
+        """Return the force (N), given R* (m) and overlaps (m)."""
         modulus = self.young / (2 * (1 - self.poisson**2))
-        push: np.ndarray = 4 / 3 * modulus * np.sqrt(radius / 2) * overlap**1.5
+        push: np.ndarray = 4 / 3 * modulus * np.sqrt(reduced) * overlap**1.5
         return push
 
     @ti.func

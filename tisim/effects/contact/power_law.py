@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,6 +24,10 @@ class ContactLaw(Effect):
     def softened(self, s, w, i, stiffness):
         """Return the stiffness (N/m^2) of grain i as it is now, given the stiffness of the material."""
         return stiffness
+
+    def softened_stiffness(self, state: Mapping[str, np.ndarray], stiffness: np.ndarray) -> np.ndarray:
+        """Return the same in NumPy for all grains of a state; infinity if a law does not define it."""
+        return np.full(stiffness.shape, np.inf)
 
 
 class Contact(NormalContact):
@@ -46,6 +51,27 @@ class Contact(NormalContact):
         area = math.pi * overlap * (radius - 0.25 * overlap)
         push: np.ndarray = self.stiffness * (overlap / (2 * radius)) ** self.exponent * area
         return push
+
+    def normal_force(
+        self,
+        state: Mapping[str, np.ndarray],
+        i: np.ndarray,
+        j: np.ndarray,
+        overlap: np.ndarray,
+        effects: Sequence[Effect],
+    ) -> np.ndarray:
+        radius = state["radius"].astype(float)
+        stiffness = np.full(radius.shape, self.stiffness)
+        for law in effects:
+            if isinstance(law, ContactLaw):
+                stiffness = law.softened_stiffness(state, stiffness)
+        sizes, step = radius[i] + radius[j], radius[i] - radius[j]
+        distance = sizes - overlap
+        # The contact circle, B.5; there is none if a sphere is inside the other.
+        apart = np.maximum(distance**2 - step**2, 0.0)
+        area = np.pi / 4 * (distance + sizes) * overlap * apart / distance**2
+        force: np.ndarray = 0.5 * (stiffness[i] + stiffness[j]) * (overlap / sizes) ** self.exponent * area
+        return force
 
     @ti.func
     def stiffness_of(self, s, w, i):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.base import parameter
@@ -29,6 +32,10 @@ class ContactSoftening(ContactLaw):
         "K", "reference temperature T*, at which the stiffness is K_0", examples=[300.0], gt=0
     )
     floor: float = parameter("N/m^2", "lower limit K_lim of the stiffness", 0.0, ge=0)
+
+    def softened_stiffness(self, state: Mapping[str, np.ndarray], stiffness: np.ndarray) -> np.ndarray:
+        excess = state["temperature"].astype(float) / self.reference_temperature - 1.0
+        return np.maximum(stiffness * np.exp(-self.sensitivity * excess), self.floor)
 
     @ti.func
     def softened(self, s, w, i, stiffness):

@@ -4,7 +4,7 @@ the container of a packing."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache, singledispatch
 
 import numpy as np
@@ -19,6 +19,8 @@ from tisim.effects.walls.rotation import Rotation
 from tisim.effects.walls.servo import Servo
 from tisim.effects.walls.translation import Translation
 from tisim.effects.walls.walls import Walls
+from tisim.geometry.plane import Plane
+from tisim.geometry.shape import Shape
 from tisim.geometry.tessellation import bounded_planes, box_corners, fan, sharp_edges, tessellated
 
 MARGIN = 0.1
@@ -26,17 +28,51 @@ MARGIN = 0.1
 
 
 @dataclass(frozen=True)
+class WallBody:
+    """The walls of one effect, which form a rigid body.
+
+    name : of the effect. planes : infinite walls. shapes : all others. material : name of their material;
+    None for the first of the scene, or none.
+    """
+
+    name: str
+    planes: tuple[Plane, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+    motion: Motion = field(default_factory=Fixed)
+    material: str | None = None
+
+
+@singledispatch
+def wall_body(effect: Effect) -> WallBody | None:
+    """Return the walls of an effect that are drawn and exported; None if it has none. The container of a
+    packing is no such body, as it may grow: see ``placed_container``.
+
+    An effect with walls of its own registers a function here.
+    """
+    return None
+
+
+@wall_body.register
+def _(effect: Walls) -> WallBody:
+    shapes = [shape for name, _ in effect.lists() for shape in getattr(effect, name)]
+    shapes += [effect.surface] if effect.surface else []
+    finite = tuple(one for one in shapes if not isinstance(one, Plane))
+    return WallBody(effect.label, effect.planes, finite, effect.motion, effect.material)
+
+
+@dataclass(frozen=True)
 class PlacedWalls:
     """The surface of the walls of one effect, at a time.
 
     name : of the effect. triangles : m, shape (n, 3, 3). edges : the rims and the sharp edges, m, shape (k,
-    2, 3). fixed : whether the walls are the same at all times.
+    2, 3). fixed : whether the walls are the same at all times. material : as of ``WallBody``.
     """
 
     name: str
     triangles: np.ndarray
     edges: np.ndarray
     fixed: bool
+    material: str | None = None
 
 
 def placed_walls(
@@ -54,8 +90,8 @@ def placed_walls(
         this, relative to the size of this box without them, are left out.
     """
     bodies = []
-    for walls in (effect for effect in effects if isinstance(effect, Walls)):
-        travel = (measures or {}).get(f"{walls.label}_travel", 0.0 if time == 0 else np.nan)
+    for walls in filter(None, map(wall_body, effects)):
+        travel = (measures or {}).get(f"{walls.name}_travel", 0.0 if time == 0 else np.nan)
         if not walls.motion.quantities or np.isfinite(travel):
             bodies.append((walls, travel, *_finite(walls)))
     ends = [placed(walls.motion, finite.reshape(-1, 3), time, travel) for walls, travel, finite, _ in bodies]
@@ -84,7 +120,7 @@ def placed_walls(
         near = [(np.linalg.norm(each - middle, axis=2) <= limit).all(axis=1) for each in (corners, lines)]
         # The ends of planes move with the grains.
         fixed = not walls.motion.moves and not walls.planes
-        found.append(PlacedWalls(walls.label, corners[near[0]], lines[near[1]], fixed))
+        found.append(PlacedWalls(walls.name, corners[near[0]], lines[near[1]], fixed, walls.material))
     return found
 
 
@@ -99,12 +135,34 @@ def placed_container(scene: SceneParts, state: Mapping[str, np.ndarray]) -> Plac
     return PlacedWalls(walls.label, triangles, sharp_edges(triangles), not any(walls.container.scaled()))
 
 
+def placed_surfaces(
+    scene: SceneParts,
+    time: float,
+    around: np.ndarray,
+    measures: Mapping[str, float] | None = None,
+    state: Mapping[str, np.ndarray] | None = None,
+    reach: float = np.inf,
+) -> list[PlacedWalls]:
+    """Return the walls of a scene at a time (s), as ``placed_walls``, and the container of a packing.
+
+    state : of the bodies at the time; without it the container is left out.
+    """
+    placed = placed_walls(scene.effects, time, around, measures, reach)
+    if state is not None and (container := placed_container(scene, state)) is not None:
+        placed.append(container)
+    return placed
+
+
+def names_of_surfaces(scene: SceneParts) -> list[str]:
+    """Return the names of all effects that ``placed_surfaces`` may draw, in the order of the scene."""
+    held = confinement(scene)
+    return [one.label for one in scene.effects if wall_body(one) is not None or one is held]
+
+
 @lru_cache(maxsize=16)
-def _finite(walls: Walls) -> tuple[np.ndarray, np.ndarray]:
+def _finite(walls: WallBody) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangles and the edges of all walls of a body but planes, m."""
-    shapes = [shape for name, _ in walls.lists() for shape in getattr(walls, name)]
-    shapes += [walls.surface] if walls.surface else []
-    each = [tessellated(shape) for shape in shapes]
+    each = [tessellated(shape) for shape in walls.shapes]
     triangles = np.concatenate([np.empty((0, 3, 3)), *each])
     return triangles, np.concatenate([np.empty((0, 2, 3)), *(sharp_edges(one) for one in each)])
 

@@ -31,7 +31,7 @@ const TIME = { name: "time", symbol: "t", unit: "s", whole: false };
 
 class Chart {
   /** facts : title, unit, logarithmic, curves of label and values, perhaps with low and high values of a band;
-      perhaps marks of x, value, low, high and label. times : horizontal places of the values, s.
+      perhaps marks of x, value, low, high and label; perhaps lines of x and label, across. times : horizontal places of the values, s.
       jump : called with a time. axis : name, symbol and unit of the horizontal axis; whole: whole numbers alone. */
   constructor(place, facts, times, jump, fileName, axis = TIME) {
     Object.assign(this, { facts, times, jump, fileName, axis, time: null });
@@ -116,6 +116,11 @@ class Chart {
       if (!drawn(value)) continue;
       if (drawn(least) && drawn(most)) parts.push(element("line", { class: "mark", x1: this.x(x), x2: this.x(x), y1: this.y(least), y2: this.y(most) }));
       parts.push(element("circle", { class: "mark", cx: this.x(x), cy: this.y(value), r: 4 }));
+    }
+    for (const { x, label } of facts.lines ?? []) {
+      if (x < begin || x > end) continue;
+      parts.push(element("line", { class: "across", x1: this.x(x), x2: this.x(x), y1: top, y2: HEIGHT - bottom }));
+      text(this.x(x) - 4, top + 2, label, { "text-anchor": "end", transform: `rotate(-90 ${this.x(x) - 4} ${top + 2})` });
     }
     if (facts.curves.length > 1) {
       let x = wide - right;

@@ -4,6 +4,7 @@ const CLASSES = [[68, 119, 170], [238, 102, 119], [34, 136, 51], [204, 187, 68],
   [187, 187, 187], [221, 136, 51], [110, 80, 160], [90, 150, 140], [180, 120, 90], [120, 120, 120]];
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const FRAMES_A_SECOND = 20;
+const MOST_LISTED = 6;          // contacts of a chosen particle whose forces are shown
 const DARK_END = 9;             // colours of a map that are left out on a dark ground
 
 const PLAY = "M4 2.5v11L14 8z", PAUSE = "M4 3h3v10H4z M9.5 3h3v10h-3z";
@@ -81,7 +82,7 @@ class Player {
     if (scene.bodies.length) shown.push(check("walls", true, (on) => this.viewer.set({ walls: on })));
     if (scene.box) shown.push(check("box", true, (on) => this.viewer.set({ box: on })));
     if (scene.lines) shown.push(check(`${scene.lines.name} lines at ${quantity(scene.lines.time, "s")}`, true, (on) => this.viewer.set({ lines: on })));
-    if (this.network) shown.push(check("contacts", false, (on) => this.viewer.set({ contacts: on })));
+    if (this.network) shown.push(check("contacts", false, (on) => this.showContacts(on)));
     shown.push(check("outlines", true, (on) => this.viewer.set({ outlines: on })));
     shown.push(check("perspective", true, (on) => this.viewer.set({ flat: !on })));
     const magnets = choice("Magnets", [["solid", "solid"], ["glass", "glass"], ["", "hidden"]], (how) => this.viewer.set({ magnets: how }));
@@ -101,7 +102,8 @@ class Player {
         group("Clipping plane", this.cutAxis.label, this.cutPlace),
         group("View", ...shown, element("span", { class: "buttons" }, ...views, button("all", "Show all", () => this.home()))),
         group("Downloads", button("PNG of the view", "Save the view as PNG", () => this.png()),
-          button("CSV of this frame", "Save the particles of this frame as CSV", () => this.csv())))),
+          button("CSV of this frame", "Save the particles of this frame as CSV", () => this.csv()),
+          ...(this.network ? [button("CSV of contacts", "Save the contacts of this frame as CSV", () => this.contactsCsv())] : [])))),
       this.live);
     if (last < 1) this.slider.disabled = true;
   }
@@ -134,6 +136,7 @@ class Player {
     const name = viewer.options.colour;
     if (!name && !this.chosenColour) this.firstColour();
     else if (name && !this.chosenRange) this.setRange(...trajectory.columns[name].shown);
+    this.drawLegend();
     if (!this.playing) this.go(following ? last : Math.min(this.frame, last));
     else viewer.invalidate();
   }
@@ -300,9 +303,20 @@ class Player {
   }
 
   drawLegend() {
-    const { options } = this.viewer, column = this.trajectory.columns[options.colour];
     this.legend.replaceChildren();
-    this.legend.hidden = !column;
+    this.drawColours();
+    const scale = this.forceScale();
+    if (scale) {
+      const strip = element("div", { class: "strip" });
+      strip.style.background = `linear-gradient(to right, ${scale.colours.map((rgb) => `rgb(${rgb})`).join(",")})`;
+      this.legend.append(element("div", { class: "name" }, scale.name), strip,
+        element("div", { class: "ends" }, ...scale.ends.map((text) => element("span", {}, text))));
+    }
+    this.legend.hidden = !this.legend.childElementCount;
+  }
+
+  drawColours() {
+    const { options } = this.viewer, column = this.trajectory.columns[options.colour];
     if (!column) return;
     const ends = options.range.map(Math.abs), name = this.label({ ...column, unit: "" });
     const [by, unit] = options.discrete || column.logarithmic ? [1, raised(column.unit)] : axisUnit(Math.max(...ends), column.unit);
@@ -326,6 +340,41 @@ class Player {
   ticks(column) {
     const [low, high] = this.viewer.options.range;
     return [low, column.logarithmic ? Math.sqrt(Math.max(low, 1e-300) * high) : (low + high) / 2, high];
+  }
+
+  // Contacts
+
+  showContacts(on) {
+    this.viewer.set({ contacts: on });
+    this.drawLegend();
+    this.inspect();
+  }
+
+  /** Name, colours [r, g, b] in 0..255 and labels of the scale of forces; null if no forces are shown. */
+  forceScale() {
+    const { viewer } = this, usual = viewer.usualForce();
+    if (!viewer.options.contacts || !usual) return null;
+    const [by, unit] = axisUnit(usual, "N"), { weak, strong, pull } = viewer.forceColours(), both = viewer.attracts();
+    return {
+      name: `contact force (${unit})`,
+      colours: (both ? [pull, weak, strong] : [weak, strong]).map((rgb) => rgb.map((x) => Math.round(255 * x))),
+      ends: (both ? [-usual, 0, usual] : [0, usual / 2, usual]).map((force) => number(force / by, 3)),
+    };
+  }
+
+  /** The contacts of this frame, or those of a row: ids and force in N, the strongest first. */
+  contacts(row = null) {
+    const { trajectory, frame } = this, found = [], id = (one) => trajectory.id(frame, one);
+    this.viewer.contacts()?.each(trajectory.at(frame).frame, (i, j, force) => {
+      if (row === null || row === i) found.push([id(i), id(j), force]);
+      else if (row === j) found.push([id(j), id(i), force]);
+    });
+    return found.sort((a, b) => Math.abs(b[2]) - Math.abs(a[2]));
+  }
+
+  contactsCsv() {
+    const known = this.viewer.usualForce() > 0, rows = this.contacts().map((one) => (known ? one : one.slice(0, 2)));
+    download(`${this.fileName()}_contacts.csv`, csv([["id", "other id", ...(known ? ["normal force (N)"] : [])], ...rows]), "text/csv");
   }
 
   // The clipping plane
@@ -392,6 +441,11 @@ class Player {
       const value = column.value(frame, row), name = column.name === "material" ? this.facts.materials[value] : null;
       rows.push([this.label(column).replace(/ \([^(]*\)$/, ""), name ?? `${number(value, column.exact ? 9 : 4)} ${raised(column.unit)}`.trim()]);
     }
+    if (this.viewer.options.contacts) {
+      const found = this.contacts(row), known = this.viewer.usualForce() > 0;
+      rows.push(["contacts", `${found.length}`]);
+      for (const [, other, force] of known ? found.slice(0, MOST_LISTED) : []) rows.push([`force with ${other}`, quantity(force, "N")]);
+    }
     return rows;
   }
 
@@ -449,6 +503,21 @@ class Player {
       pen.fillText(number(ends[0], 3), 14, bottom);
       pen.textAlign = "right";
       pen.fillText(number(ends[2], 3), 14 + wide, bottom);
+    }
+    const forces = this.forceScale();
+    if (forces) {
+      const top = column ? bottom - 88 : bottom - 28, ramp = pen.createLinearGradient(14, 0, 194, 0);
+      forces.colours.forEach((rgb, k) => ramp.addColorStop(k / (forces.colours.length - 1), `rgb(${rgb})`));
+      pen.fillStyle = ramp;
+      pen.fillRect(14, top, 180, 10);
+      pen.fillStyle = style.color;
+      pen.textAlign = "left";
+      pen.font = `14px ${style.fontFamily}`;
+      pen.fillText(forces.name, 14, top - 8);
+      pen.font = `12px ${style.fontFamily}`;
+      pen.fillText(forces.ends[0], 14, top + 28);
+      pen.textAlign = "right";
+      pen.fillText(forces.ends[2], 194, top + 28);
     }
     const long = this.bar.clientWidth, right = canvas.clientWidth - 16;
     pen.textAlign = "center";

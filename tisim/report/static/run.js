@@ -19,6 +19,10 @@ async function start() {
   };
   const curves = document.getElementById("curves"), name = facts.name.replace(/[^\w.-]+/g, "_");
   report.charts = facts.series.curves.map((one) => new Chart(curves, one, facts.series.times, jump, name));
+  const omega = { name: "angular frequency", symbol: "\u03c9", unit: "1/s", whole: false }, below = document.getElementById("spectra");
+  report.spectra = (facts.spectra ?? []).map((one) => new Chart(below, one, one.omega, () => {}, name, omega));
+  // Their highest lines are read out at first.
+  for (const one of report.spectra) one.at(one.times[one.facts.curves[0].values.reduce((best, y, k, all) => (y > all[best] ? k : best), 0)]);
   report.player?.listeners.push((frame) => { for (const chart of report.charts) chart.at(report.trajectory.times[frame]); });
   themes((dark) => report.player?.theme(dark));
   report.player?.go(facts.live ? report.trajectory.frames - 1 : 0);

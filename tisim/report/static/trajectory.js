@@ -141,7 +141,7 @@ class ContactNetwork {
       return value;
     };
     Object.assign(own, facts, { pairs: new Int32Array(4 * n), begin: new Uint32Array(n) });
-    own.depth = bytes.subarray(16 * n);
+    own.whole = bytes.subarray(16 * n);
     for (let k = 0, row = 0, begin = 0; k < n; k++) {
       row += word(0, k);
       const first = word(2, k), last = first + word(3, k);
@@ -152,13 +152,13 @@ class ContactNetwork {
     return own;
   }
 
-  /** Calls visit(row, row, overlap in m) for each contact in a frame. */
+  /** Calls visit(row, row, force in N, repulsion positive) for each contact in a frame. */
   each(frame, visit) {
     for (let k = 0; k < this.begin.length; k++) {
       const first = this.pairs[4 * k + 2], last = this.pairs[4 * k + 3];
       if (first <= frame && frame <= last) {
-        const depth = this.depth[this.begin[k] + frame - first] / this.steps * this.largest;
-        visit(this.pairs[4 * k], this.pairs[4 * k + 1], depth);
+        const root = this.origin + this.step * this.whole[this.begin[k] + frame - first];
+        visit(this.pairs[4 * k], this.pairs[4 * k + 1], root * Math.abs(root));
       }
     }
   }

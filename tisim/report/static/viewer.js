@@ -193,8 +193,10 @@ layout(location = 2) in vec3 end;
 layout(location = 3) in float weight;
 uniform mat4 pose;
 uniform vec2 screen;
-uniform vec2 width;          // pixels: width.x + width.y * weight
+uniform vec2 width;          // pixels: width.x + width.y * |weight|
+uniform vec4 weak, plain, pull; // colours at the weights 0, 1 and -1
 out float across, half_;      // pixels from the middle of the line, and half its width
+out vec4 ink;
 out vec3 at;
 void main() {
   vec3 a = (view * pose * vec4(start, 1.0)).xyz, b = (view * pose * vec4(end, 1.0)).xyz;
@@ -207,7 +209,8 @@ void main() {
   vec4 p = projection * vec4(a, 1.0), q = projection * vec4(b, 1.0), r = corner.x < 0.0 ? p : q;
   vec2 way = (q.xy / q.w - p.xy / p.w) * screen;
   way = length(way) > 1e-6 ? normalize(way) : vec2(1.0, 0.0);
-  half_ = 0.5 * (width.x + width.y * weight);
+  half_ = 0.5 * (width.x + width.y * abs(weight));
+  ink = mix(weak, weight < 0.0 ? pull : plain, abs(weight));
   across = corner.y * (half_ + 1.0);
   vec2 aside = vec2(-way.y, way.x) * 2.0 * across / screen;
   at = corner.x < 0.0 ? a : b;
@@ -217,11 +220,11 @@ void main() {
 const LINE_FRAGMENT = SHARED + `
 in float across, half_;
 in vec3 at;
-uniform vec4 plain;
+in vec4 ink;
 layout(location = 0) out vec4 colour;
 void main() {
   if (cutting && dot(cut.xyz, at) > cut.w) discard;
-  colour = vec4(plain.rgb, plain.a * clamp(half_ + 0.5 - abs(across), 0.0, 1.0) * min(2.0 * half_, 1.0));
+  colour = vec4(ink.rgb, ink.a * clamp(half_ + 0.5 - abs(across), 0.0, 1.0) * min(2.0 * half_, 1.0));
 }`;
 
 const WALL_VERTEX = SHARED + `
@@ -313,6 +316,12 @@ const Matrix = {
 const FIELD_OF_VIEW = 26 * Math.PI / 180;
 const CORNERS = new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]);
 const LEAST_PIXELS = 1.6;       // radius of a particle on the screen, so that it is visible
+/* Weak, repulsive and attractive contacts, on a bright and on a dark ground. */
+const FORCE_COLOURS = [
+  { weak: [0.66, 0.66, 0.64], strong: [0.78, 0.12, 0.04], pull: [0.08, 0.30, 0.78] },
+  { weak: [0.34, 0.37, 0.42], strong: [1.0, 0.66, 0.16], pull: [0.35, 0.68, 1.0] }];
+const BESIDE_CONTACTS = 0.2;    // radius of a particle, over its own, so that its contacts are visible
+const ONLY_TOUCHING = 0.4;      // weight of contacts whose force is not known
 const FIRST_VIEW = { azimuth: -62 * Math.PI / 180, elevation: 18 * Math.PI / 180 };
 
 class Viewer {
@@ -544,23 +553,48 @@ class Viewer {
     this.invalidate();
   }
 
+  /** The contacts of the part that is shown; null if it has none. */
+  contacts() {
+    return "network" in this.part ? this.part.network : this.network;
+  }
+
+  networks() {
+    return (this.trajectory.parts ?? [this]).map((part) => part.network).filter(Boolean);
+  }
+
+  /** The force (N) of the strongest colour; 0 if forces are not known. */
+  usualForce() {
+    return Math.max(0, ...this.networks().map((one) => one.usual));
+  }
+
+  /** Whether some contacts attract. */
+  attracts() {
+    return this.networks().some((one) => one.origin < 0);
+  }
+
   findContacts() {
-    const network = this.part.network ?? this.network;
+    const network = this.contacts(), usual = this.usualForce();
     if (!network || !this.options.contacts) return this.lines([], null, this.contactLines);
-    const ends = [], weights = [], box = this.scene.box;
+    const found = [], box = this.scene.box;
     const rows = box ? this.edges().map((edge, k) => (box.periodic[k] ? edge : null)) : [null, null, null];
     const order = [0, 1, 2].sort((a, b) => (rows[b] ?? []).filter(Boolean).length - (rows[a] ?? []).filter(Boolean).length);
-    network.each(this.part.frame, (i, j, depth) => {
+    network.each(this.part.frame, (i, j, force) => {
       const a = this.trajectory.position(this.frame, i), b = this.trajectory.position(this.frame, j);
       for (const axis of order) {
         if (!rows[axis]) continue;
         const turns = Math.round((b[axis] - a[axis]) / rows[axis][axis]);
         for (let m = 0; m < 3; m++) b[m] -= turns * rows[axis][m];
       }
-      ends.push(...this.relative(a), ...this.relative(b));
-      weights.push(Math.min(1, depth / network.usual) ** 1.5);   // as Hertz's force
+      const weight = usual ? Math.max(-1, Math.min(1, force / usual)) : ONLY_TOUCHING;
+      found.push({ weight, ends: [...this.relative(a), ...this.relative(b)] });
     });
-    this.lines(ends, new Float32Array(weights), this.contactLines);
+    // The strongest are drawn last, over the others.
+    found.sort((a, b) => Math.abs(a.weight) - Math.abs(b.weight));
+    this.lines(found.flatMap((one) => one.ends), Float32Array.from(found, (one) => one.weight), this.contactLines);
+  }
+
+  forceColours() {
+    return FORCE_COLOURS[Number(this.options.dark)];
   }
 
   /** Colours [r, g, b] in 0..255 of a map; discrete for classes. */
@@ -717,7 +751,7 @@ class Viewer {
   drawParticles(lens, samples) {
     const { gl, options, part: { trajectory } } = this, places = this.use("particles", lens);
     const { position, radius, orientation } = trajectory.columns, colour = trajectory.columns[options.colour];
-    const factor = options.scale * (options.contacts && this.network ? 0.35 : 1);
+    const factor = options.scale * (options.contacts && this.contacts() ? BESIDE_CONTACTS : 1);
     gl.uniform3fv(places.origin, this.relative(position.origin));
     gl.uniform3fv(places.step_, position.step.map((step) => step / this.unit));
     const other = options.size && options.size !== "radius" ? trajectory.columns[options.size] : null;
@@ -792,10 +826,12 @@ class Viewer {
 
   drawLines(lens, samples) {
     const { gl, options } = this, places = this.use("lines", lens), ink = options.dark ? 0.62 : 0.42;
-    const draw = (lines, body, rgba, width) => {
+    const draw = (lines, body, rgba, width, weak = rgba, pull = rgba) => {
       if (!lines.count) return;
       gl.uniformMatrix4fv(places.pose, false, this.pose(body));
+      gl.uniform4f(places.weak, ...weak);
       gl.uniform4f(places.plain, ...rgba);
+      gl.uniform4f(places.pull, ...pull);
       gl.uniform2f(places.width, ...width.map((x) => x * samples * devicePixelRatio));
       gl.bindVertexArray(lines.array);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, lines.count);
@@ -804,7 +840,8 @@ class Viewer {
     if (options.box) draw(this.boxLines, null, [ink, ink, ink, 1], [0.9, 0]);
     if (options.walls) for (const body of this.bodies) draw(body.lines, body, [ink, ink * 1.02, ink * 1.06, 1], [1.1, 0]);
     if (options.lines && this.scene.lines) draw(this.fieldLines, null, [...this.scene.lines.colour.map((x) => x / 255 + (options.dark ? 0.2 : 0)), 1], [1.4, 0]);
-    if (options.contacts && this.network) draw(this.contactLines, null, options.dark ? [0.98, 0.72, 0.3, 1] : [0.72, 0.2, 0.1, 1], [0.4, 6]);
+    const { weak, strong, pull } = this.forceColours();
+    if (options.contacts) draw(this.contactLines, null, [...strong, 1], [0.6, 6], [...weak, 1], [...pull, 1]);
   }
 
   drawWalls(lens) {

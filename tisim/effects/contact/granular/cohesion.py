@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.parts import Cohesion, Overlap
@@ -35,8 +37,9 @@ class SJKR(Cohesion):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"density": pair.mixed("cohesion_energy_density")}
 
-    def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        return 2 * math.pi * pair.mixed("cohesion_energy_density") * radius * overlap
+    def pulls(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
+        pull: Any = 2 * math.pi * pair.mixed("cohesion_energy_density") * radius * overlap
+        return pull
 
     @ti.func
     def pull(self, w, pair, radius, overlap):
@@ -67,8 +70,9 @@ class DMT(Cohesion):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"line": 4 * math.pi * pair.mixed("surface_energy")}
 
-    def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        return 4 * math.pi * pair.mixed("surface_energy") * radius + 0.0 * overlap
+    def pulls(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
+        pull: Any = 4 * math.pi * pair.mixed("surface_energy") * radius + 0.0 * overlap
+        return pull
 
     @ti.func
     def pull(self, w, pair, radius, overlap):

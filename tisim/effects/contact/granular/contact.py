@@ -54,6 +54,17 @@ class GranularContact(ShapeContact, MaterialLaw, PairForce):
     def required_fields(self) -> tuple[str | Field, ...]:
         return (*self.fields, "material") if self.several else self.fields
 
+    def normal_force(
+        self,
+        state: Mapping[str, np.ndarray],
+        i: np.ndarray,
+        j: np.ndarray,
+        overlap: np.ndarray,
+        effects: Sequence[Effect],
+    ) -> np.ndarray:
+        """Return the normal force (N) between overlapping spheres, as ``NormalContact.normal_force``."""
+        return np.full(overlap.shape, np.inf)
+
     @ti.func
     def lasts(self, w, pair, overlap, radius, past):
         """Return whether the contact exists; a law that acts beyond contact also uses its history."""

@@ -153,8 +153,26 @@ class Granular(ContactGuards, GranularContact):
                 shortest = min(shortest, step)
         return shortest if shortest > 0 else None
 
-    def push(self, pair: Touching, radius: float, overlap: np.ndarray) -> np.ndarray:
-        """Return the force (N) at overlaps (m), with its cohesion, at this R* (m)."""
+    def normal_force(
+        self,
+        state: Mapping[str, np.ndarray],
+        i: np.ndarray,
+        j: np.ndarray,
+        overlap: np.ndarray,
+        effects: Sequence[Effect],
+    ) -> np.ndarray:
+        a, b = state["radius"][i].astype(float), state["radius"][j].astype(float)
+        radius, force = a * b / (a + b), np.full(overlap.shape, np.inf)
+        material = state["material"] if self.several else np.zeros(len(state["radius"]), int)
+        pairs = material[i].astype(int) * self.number_of_materials + material[j].astype(int)
+        for k, pair in enumerate(self._materials.touching()):
+            own = pairs == k
+            if own.any():
+                force[own] = self.push(pair, radius[own], overlap[own])
+        return force
+
+    def push(self, pair: Touching, radius: float | np.ndarray, overlap: np.ndarray) -> np.ndarray:
+        """Return the force (N) at overlaps (m), with its cohesion, at this R* (m), one or one for each."""
         pull = self.cohesion.pulls(pair, radius, overlap) if self.cohesion is not None else 0.0
         return self.normal.push(pair, radius, overlap) - pull
 

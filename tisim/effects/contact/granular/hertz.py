@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.parts import NormalForce, Overlap
@@ -25,8 +27,9 @@ class HertzMaterial(NormalForce):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"modulus": 2 * pair.effective_young}
 
-    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        return 4 / 3 * pair.effective_young * (radius * overlap) ** 0.5 * overlap
+    def push(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
+        push: Any = 4 / 3 * pair.effective_young * (radius * overlap) ** 0.5 * overlap
+        return push
 
     @ti.func
     def stiffness(self, w, pair, circle):

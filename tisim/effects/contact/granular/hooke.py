@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
 from tisim.backend.taichi import ti
 from tisim.effects.contact.granular.parts import NormalForce, Overlap
 from tisim.materials.materials import Touching
@@ -25,7 +27,7 @@ class Hooke(NormalForce):
     def mix(self, pair: Touching) -> dict[str, float]:
         return {"constant": pair.mixed("stiffness")}
 
-    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+    def push(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
         return pair.mixed("stiffness") * overlap
 
     @ti.func

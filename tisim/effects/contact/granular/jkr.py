@@ -54,11 +54,16 @@ class JKR(NormalForce):
             "stretch": 1.5 * (ratio * ratio / 2) ** (1 / 3),
         }
 
-    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
+    def push(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
+        if isinstance(radius, np.ndarray):
+            # The law is the same at all R* for forces over R* and overlaps over its cube root.
+            largest = float(radius.max())
+            scaled: Overlap = radius / largest * self.push(pair, largest, overlap * np.cbrt(largest / radius))
+            return scaled
         young, ratio = pair.effective_young, math.pi * pair.mixed("surface_energy") / pair.effective_young
         smallest = (0.25 * radius * radius * ratio) ** (1 / 3)  # where the equation ends
-        largest = 2 * (np.sqrt(radius * np.max(overlap)) + smallest)
-        circle = smallest + (largest - smallest) * np.linspace(0, 1, CIRCLES) ** 2
+        widest = 2 * (np.sqrt(radius * np.max(overlap)) + smallest)
+        circle = smallest + (widest - smallest) * np.linspace(0, 1, CIRCLES) ** 2
         depth = circle**2 / radius - 2 * np.sqrt(ratio * circle)
         force = 4 / 3 * young * circle**3 / radius - 4 * young * np.sqrt(ratio * circle**3)
         pushes: Overlap = np.interp(overlap, depth, force)

@@ -43,10 +43,11 @@ class NormalForce(ContactPart):
     beyond_contact: ClassVar[bool] = False
     memory: ClassVar[int] = 0
 
-    def push(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        """Return the elastic force (N) at an overlap (m), or an array of overlaps, at this R* (m); infinity
-        if a law does not define it. It is used to check that it exceeds overlap-dependent cohesion at an
-        overlap of R*, and to find the critical time step from its slope."""
+    def push(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
+        """Return the elastic force (N) at an overlap (m) and this R* (m); infinity if a law does not define
+        it. The overlap may be an array, and then R* too. It is used to check that it exceeds
+        overlap-dependent cohesion at an overlap of R*, to find the critical time step from its slope, and to
+        draw the forces of contacts."""
         return overlap * math.inf
 
     @ti.func
@@ -215,8 +216,8 @@ class Cohesion(ContactPart):
     by_overlap: ClassVar[bool] = False
     jumps: ClassVar[bool] = False
 
-    def pulls(self, pair: Touching, radius: float, overlap: Overlap) -> Overlap:
-        """Return its force (N) at an overlap (m), or an array of overlaps, at this R* (m)."""
+    def pulls(self, pair: Touching, radius: float | np.ndarray, overlap: Overlap) -> Overlap:
+        """Return its force (N) at an overlap (m), or an array of overlaps, at this R* (m), as ``push``."""
         return 0.0 * overlap
 
     @ti.func
