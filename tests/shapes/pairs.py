@@ -102,7 +102,8 @@ def _rods(c: Array, qi: Array, rod_i: Array, qj: Array, rod_j: Array, out: Array
 @ti.kernel
 def _spheres(c: Array, radii: Array, out: Array):
     for m in range(c.shape[0]):
-        gap, normal, x, y = closest_spheres(_vector(c, m, 3), *_vector(radii, m, 2))
+        up, r = ti.Vector([0.0, 0.0, 1.0]), _vector(radii, m, 2)
+        gap, normal, x, y = closest_spheres(_vector(c, m, 3), r[0], r[1], up)
         _write(out, m, gap, normal, x, y)
 
 

@@ -16,16 +16,16 @@ def parallel_sine() -> float:
 
 
 @ti.func
-def closest_spheres(separation, radius_i, radius_j):
+def closest_spheres(separation, radius_i, radius_j, concentric):
     """Return gap (m), unit normal from i to j, and the points of contact (m), each relative to the centre of
     its sphere.
 
     separation : centre of j minus centre of i (m). radius_i, radius_j : m. The gap of spheres that overlap is
-        negative. The normal of concentric spheres is z.
+        negative. concentric : normal of concentric spheres, a unit vector. If it is the same for all, many in
+        one place are moved apart along a line only.
     """
     size = separation.norm()
-    up = ti.Vector([0.0 * size, 0.0 * size, 1.0 + 0.0 * size])
-    normal = ti.select(size > 0.0, separation / ti.select(size > 0.0, size, 1.0), up)
+    normal = ti.select(size > 0.0, separation / ti.select(size > 0.0, size, 1.0), concentric)
     return size - radius_i - radius_j, normal, radius_i * normal, -radius_j * normal
 
 

@@ -57,7 +57,7 @@ class Rods(Shaped):
     @ti.func
     def between(self, s, w, i, j, q_i, q_j, separation, far):
         radius_i, radius_j = self.rod_radius(s, w, i), self.rod_radius(s, w, j)
-        gap, normal, here, there = closest_spheres(separation, radius_i, radius_j)
+        gap, normal, here, there = closest_spheres(separation, radius_i, radius_j, self.axis(q_i))
         if ti.static(not self.spheres):
             gap, normal, here, there = closest_rods(
                 separation,
