@@ -57,7 +57,7 @@ INNER = "|".join(
         r"tisim\.(effects\.base\.effect\.SceneParts|sources\.magnetic\.mutual_magnetisation\.Magnetised)",
         r"tisim\.sources\.pore_flow\.(solids|pore_flow)\.\w+",
         r"tisim\.notebook\.\w+",
-        r"tisim\.io\.reader\.RecordedWorld",
+        r"tisim\.(io\.reader\.RecordedWorld|report\.spectrum\.Spectrum)",
         r"(tisim\.)?optimize\.(report\.search_page|methods\.\w+|problem\.(function|constraint|statistic)|storage\.cache|analysis\.\w+)\.\w+",
     )
 )
