@@ -25,7 +25,7 @@ ASPECTS = (1.0, 1.1, 1.25, 1.4, 1.5, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
 """Aspect ratios Lambda of rods in a periodic box."""
 REVISED_ASPECTS = (1.0, 1.5, 3.0, 5.0, 10.0)
 """Aspect ratios that are also packed by the revised method."""
-LONG_ASPECTS = (25.0, 50.0, 100.0)
+LONG_ASPECTS = (25.0, 50.0)
 """Aspect ratios of long rods, for which B16 finds phi L/D = 5."""
 CYLINDER_ASPECTS = (1.0, 3.0)
 """Aspect ratios in a cylinder."""

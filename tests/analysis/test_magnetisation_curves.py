@@ -122,7 +122,7 @@ def test_exact_curves_are_found(name, size):
     assert found.radii.mean == pytest.approx(radii.mean, rel=1e-7)
 
 
-@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize("known", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_intervals_have_their_nominal_coverage(rng, known):
     """Over 300 curves with a noise of 0.5 % of the saturation, estimated or known and varying."""
     radii, field, tries = DISPERSIONS["Ioniqa"], FIELD[::5], 300

@@ -315,8 +315,8 @@ def test_the_command_of_a_search_is_kept(tisim, own_file):  # noqa: F811
 
 @pytest.mark.long
 def test_the_best_designs_of_a_case_are_run_for_their_clouds(tisim, tmp_path):  # noqa: F811
-    words = ("agglomeration", "--size", "small", "--generations", 0, "--population", 5, "--out", "s")
-    assert tisim("optimize", *words, "--set", "search.ensemble.confirm=4")[0] == 0
+    words = ("agglomeration", "--size", "small", "--generations", 0, "--population", 3, "--out", "s")
+    assert tisim("optimize", *words, "--set", "search.ensemble.confirm=2")[0] == 0
     assert tisim("report", "s", "--designs", 2)[0] == 0
     facts, text = facts_of(tmp_path / "s/report.html")
     data = read_search("s")

@@ -93,7 +93,7 @@ def test_cubatic_order_is_the_largest_value_of_its_definition(rng):
     assert most == pytest.approx(found.order, abs=2e-4)
 
 
-@pytest.mark.parametrize("number", [60, 500])
+@pytest.mark.parametrize("number", [60, pytest.param(500, marks=pytest.mark.slow)])
 def test_random_orientations_have_the_order_of_their_number(number):
     found = random_order(number, samples=300, seed=2)
     error = found.nematic_deviation / np.sqrt(300)

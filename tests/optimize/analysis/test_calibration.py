@@ -43,7 +43,9 @@ def test_intervals_contain_the_truth_and_have_the_right_width(number, sets, runs
     assert width == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(("common", "grown"), [(True, 1.118), (False, 1.0)])
+@pytest.mark.parametrize(
+    ("common", "grown"), [(True, 1.118), pytest.param(False, 1.0, marks=pytest.mark.slow)]
+)
 def test_noise_of_random_starts_widens_and_does_not_bias(common, grown):
     """The spread of four starts equals the uncertainty.
 

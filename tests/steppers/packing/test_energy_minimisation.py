@@ -262,6 +262,7 @@ def test_a_world_ends_at_its_target():
         assert deepest(result.state, result.scene.domain.high[0], SPHERE, size) <= 1e-4 * RELATIVE
 
 
+@pytest.mark.slow
 def test_a_start_that_is_jammed_fails():
     result = run(scene(SPHERE, 100, 0.72))
     assert result.status.failed

@@ -182,6 +182,7 @@ def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
     assert usual[1].measures["packing_fraction"] > 0.15
 
 
+@pytest.mark.slow
 def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():
     result = run(scene(ROD, 100, 0.3, duration=5.0))
     assert result.status.failed
