@@ -122,8 +122,14 @@ class CompiledWorlds:
         before = self.assembly.sizes
         rows = f"lists of {sizes.row} pairs for a particle, {sizes.mean} on average, and of {sizes.near}"
         rows += " for events and step control do not fit in memory"
+        needed = self.assembly.list_bytes(sizes), self.assembly.list_bytes(before)
         try:
-            memory.require_lists(self.assembly.list_bytes(sizes), self.assembly.list_bytes(before))
+            try:
+                memory.require_lists(*needed)
+            except OutOfMemory:
+                # Cached memory may be in the way.
+                memory.reclaim()
+                memory.require_lists(*needed)
         except OutOfMemory as no:
             raise RunError(f"{rows}: {no}") from None
         began, image = time.perf_counter(), self.s.image()
