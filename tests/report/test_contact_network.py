@@ -6,6 +6,7 @@ import pytest
 from tests.report.conftest import scene
 from tisim import Clump, Material, Particles
 from tisim.effects import JKR, Granular, RigidClumps
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.files import python_file
 from tisim.io.reader import Frame
 from tisim.report.compressed_trajectory import compress
@@ -84,7 +85,8 @@ def test_a_law_without_a_force_in_numpy_leaves_the_contacts(own_file):
     place = np.array([[0.0, 0, 0], [1.5e-3, 0, 0]])
     state = {"id": np.arange(2), "position": place, "radius": np.full(2, 1e-3)}
     overlap = np.array([0.5e-3])
-    assert np.isinf(normal_forces(made.acting(), state, np.array([0]), np.array([1]), overlap)).all()
+    pairs = OverlappingPairs(state, np.array([0]), np.array([1]), overlap, made.acting())
+    assert np.isinf(normal_forces(pairs)).all()
     network = stored(made, state)
     assert network.pairs.tolist() == [[0, 1, 0, 0]]
     assert network.usual == 0

@@ -22,6 +22,7 @@ from tisim.effects.base import Effect, Shaped
 from tisim.effects.base.constraint import Constraint
 from tisim.effects.contact.granular.contact import GranularContact
 from tisim.effects.contact.normal import NormalContact
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.report.columns import ZLIB_LEVEL
 from tisim.report.compressed_trajectory import CompressedTrajectory, FrameSequence
 from tisim.scene.scene import Scene
@@ -88,22 +89,12 @@ def has_contacts(scene: Scene) -> bool:
     return bool(contact_laws(scene.effects)) and not shaped
 
 
-def normal_forces(
-    effects: Sequence[Effect],
-    state: Mapping[str, np.ndarray],
-    i: np.ndarray,
-    j: np.ndarray,
-    overlap: np.ndarray,
-) -> np.ndarray:
-    """Return the sum of the normal forces (N) of the contact laws between touching spheres, without damping;
-    repulsion is positive, and infinity stands for a law that does not define it.
-
-    effects : of a scene, with its materials (``Scene.acting``). state : particles. i, j : indices of both
-    particles of each pair. overlap : m.
-    """
-    total = np.zeros(len(i))
-    for law in contact_laws(effects):
-        total += law.normal_force(state, i, j, overlap, effects)
+def normal_forces(pairs: OverlappingPairs) -> np.ndarray:
+    """Return the sum of the normal forces (N) of the contact laws for each pair, without damping; repulsion
+    is positive, and infinity stands for a law that does not define it."""
+    total = np.zeros(len(pairs.i))
+    for law in contact_laws(pairs.effects):
+        total += law.normal_force(pairs)
     return total
 
 
@@ -128,7 +119,8 @@ def contact_network(frames: FrameSequence, trajectory: CompressedTrajectory) -> 
             return None
         keys.append(low * trajectory.particles + high)
         counts.append(np.full(len(i), m))
-        forces.append(normal_forces(acting, state, i, j, np.maximum(radius[i] + radius[j] - apart, 0.0)))
+        overlap = np.maximum(radius[i] + radius[j] - apart, 0.0)
+        forces.append(normal_forces(OverlappingPairs(state, i, j, overlap, acting)))
     return _network(keys, counts, forces, trajectory.particles) if total else None
 
 

@@ -26,8 +26,8 @@ def _has(path: Path, *names: str) -> bool:
 class WatchedFolder(Watched):
     """A folder that is watched, or one of its files; its ``answers`` are for a ``WatchServer``.
 
-    Until there are files, it is not known of what the folder is: a study of costs writes its first file after
-    the runs of the reference.
+    The files tell the kind of the folder. Until there are files, it is watched as the folder of a run: a
+    study of costs writes its first file after the runs of the reference.
     """
 
     def __init__(self, path: Path, begin: Callable[[Kind], Watched]) -> None:

@@ -8,6 +8,7 @@ from tests.effects.contact.grains import reference, run
 from tests.effects.contact.test_granular_impacts import couple_energies
 from tests.scenes import by_id
 from tisim.analysis.beds import contacts
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.report.contact_network import normal_forces
 
 # Grains overlap deeply at the start here, on purpose.
@@ -53,7 +54,7 @@ def test_normal_forces_in_numpy_are_those_of_grains_at_rest(name, rng):
     i, j = contacts(state["position"], radius).T
     apart = state["position"][j] - state["position"][i]
     distance = np.linalg.norm(apart, axis=1)
-    force = normal_forces(setup.acting(), state, i, j, radius[i] + radius[j] - distance)
+    force = normal_forces(OverlappingPairs(state, i, j, radius[i] + radius[j] - distance, setup.acting()))
     along, expected = (force / distance)[:, None] * apart, np.zeros((n, 3))
     np.add.at(expected, i, -along)
     np.add.at(expected, j, along)

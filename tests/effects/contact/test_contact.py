@@ -6,6 +6,7 @@ import pytest
 from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, pairs
 from tests.scenes import scene
 from tisim.effects import Contact, ContactBond, ContactDissipation, ContactFriction, ContactSoftening, Hertz
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.report.contact_network import normal_forces
 
 # Grains overlap deeply at the start here, on purpose.
@@ -165,7 +166,7 @@ def test_normal_forces_in_numpy_equal_the_reference(kinds, rng):
     state = setup.start()
     reference = Reference(setup, state)
     i, j = np.nonzero(np.triu(reference.touch))
-    force = normal_forces(setup.acting(), state, i, j, reference.delta[i, j])
+    force = normal_forces(OverlappingPairs(state, i, j, reference.delta[i, j], setup.acting()))
     assert len(force) > 10
     np.testing.assert_allclose(force, reference.sizes()[i, j], rtol=1e-9)
 

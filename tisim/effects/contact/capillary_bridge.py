@@ -11,6 +11,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, keeps_apart, parameter
 from tisim.effects.contact.granular.contact import GranularContact
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 
 
 class CapillaryBridge(GranularContact):
@@ -51,18 +52,9 @@ class CapillaryBridge(GranularContact):
         line = 2 * math.pi * self.surface_tension * math.cos(self.contact_angle)
         return [*super().values(), line, (1 + self.contact_angle / 2) * self.volume ** (1 / 3)]
 
-    def normal_force(
-        self,
-        state: Mapping[str, np.ndarray],
-        i: np.ndarray,
-        j: np.ndarray,
-        overlap: np.ndarray,
-        effects: Sequence[Effect],
-    ) -> np.ndarray:
-        a, b = state["radius"][i].astype(float), state["radius"][j].astype(float)
+    def normal_force(self, pairs: OverlappingPairs) -> np.ndarray:
         line = 2 * math.pi * self.surface_tension * math.cos(self.contact_angle)
-        pull: np.ndarray = line * (2 * a * b / (a + b))
-        return -pull
+        return -line * 2 * pairs.reduced_radius
 
     @ti.func
     def reach(self, s, w, i):

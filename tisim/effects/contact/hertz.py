@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 
 from tisim.backend.taichi import ti
-from tisim.effects.base import Effect, parameter
+from tisim.effects.base import parameter
 from tisim.effects.contact.normal import NormalContact, overlap
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 
 
 class Hertz(NormalContact):
@@ -29,16 +28,8 @@ class Hertz(NormalContact):
     def push(self, radius: float, overlap: np.ndarray) -> np.ndarray:
         return self._push(radius / 2, overlap)
 
-    def normal_force(
-        self,
-        state: Mapping[str, np.ndarray],
-        i: np.ndarray,
-        j: np.ndarray,
-        overlap: np.ndarray,
-        effects: Sequence[Effect],
-    ) -> np.ndarray:
-        a, b = state["radius"][i].astype(float), state["radius"][j].astype(float)
-        return self._push(a * b / (a + b), overlap)
+    def normal_force(self, pairs: OverlappingPairs) -> np.ndarray:
+        return self._push(pairs.reduced_radius, pairs.overlap)
 
     def _push(self, reduced: float | np.ndarray, overlap: np.ndarray) -> np.ndarray:
         """Return the force (N), given R* (m) and overlaps (m)."""

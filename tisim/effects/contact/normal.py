@@ -31,6 +31,7 @@ from tisim.effects.base.critical_step import (
     impact_stiffness,
     smallest_grains,
 )
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 
 
 @ti.func
@@ -88,21 +89,10 @@ class NormalContact(PairForce):
         infinite if a law does not define it."""
         return np.full_like(overlap, math.inf)
 
-    def normal_force(
-        self,
-        state: Mapping[str, np.ndarray],
-        i: np.ndarray,
-        j: np.ndarray,
-        overlap: np.ndarray,
-        effects: Sequence[Effect],
-    ) -> np.ndarray:
-        """Return the normal force (N) between overlapping spheres, without damping; repulsion is positive,
-        and infinity stands for a law that does not define it.
-
-        state : particles, as in a frame of a trajectory. i, j : indices of both particles of each pair.
-        overlap : m. effects : all effects of the scene.
-        """
-        return np.full(overlap.shape, np.inf)
+    def normal_force(self, pairs: OverlappingPairs) -> np.ndarray:
+        """Return the normal force (N) of each pair, without damping; repulsion is positive, and infinity
+        stands for a law that does not define it."""
+        return np.full(pairs.overlap.shape, np.inf)
 
     def critical_step(
         self, start: Mapping[str, np.ndarray], speed: float, effects: Sequence[Effect]

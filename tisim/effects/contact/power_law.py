@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option, parameter
 from tisim.effects.contact.normal import NormalContact, area, strain
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.numerics.elementary import Exponent, power
 from tisim.state.bound import Peers
 
@@ -52,19 +53,13 @@ class Contact(NormalContact):
         push: np.ndarray = self.stiffness * (overlap / (2 * radius)) ** self.exponent * area
         return push
 
-    def normal_force(
-        self,
-        state: Mapping[str, np.ndarray],
-        i: np.ndarray,
-        j: np.ndarray,
-        overlap: np.ndarray,
-        effects: Sequence[Effect],
-    ) -> np.ndarray:
-        radius = state["radius"].astype(float)
+    def normal_force(self, pairs: OverlappingPairs) -> np.ndarray:
+        i, j, overlap = pairs.i, pairs.j, pairs.overlap
+        radius = pairs.state["radius"].astype(float)
         stiffness = np.full(radius.shape, self.stiffness)
-        for law in effects:
+        for law in pairs.effects:
             if isinstance(law, ContactLaw):
-                stiffness = law.softened_stiffness(state, stiffness)
+                stiffness = law.softened_stiffness(pairs.state, stiffness)
         sizes, step = radius[i] + radius[j], radius[i] - radius[j]
         distance = sizes - overlap
         # The contact circle, B.5; there is none if a sphere is inside the other.

@@ -12,6 +12,7 @@ from tisim.effects.base import Effect, Field, PairForce, Shaped
 from tisim.effects.contact.granular.shape_contact import ShapeContact
 from tisim.effects.contact.granular.spring import midway
 from tisim.effects.contact.granular.step_limit import TRAVEL, inverse_masses, wall_inverse_masses
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.materials.material_law import MaterialLaw
 from tisim.state.bound import Peers
 
@@ -54,16 +55,9 @@ class GranularContact(ShapeContact, MaterialLaw, PairForce):
     def required_fields(self) -> tuple[str | Field, ...]:
         return (*self.fields, "material") if self.several else self.fields
 
-    def normal_force(
-        self,
-        state: Mapping[str, np.ndarray],
-        i: np.ndarray,
-        j: np.ndarray,
-        overlap: np.ndarray,
-        effects: Sequence[Effect],
-    ) -> np.ndarray:
-        """Return the normal force (N) between overlapping spheres, as ``NormalContact.normal_force``."""
-        return np.full(overlap.shape, np.inf)
+    def normal_force(self, pairs: OverlappingPairs) -> np.ndarray:
+        """Return the normal force (N) of each pair, as ``NormalContact.normal_force``."""
+        return np.full(pairs.overlap.shape, np.inf)
 
     @ti.func
     def lasts(self, w, pair, overlap, radius, past):

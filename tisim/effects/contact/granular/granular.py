@@ -37,6 +37,7 @@ from tisim.effects.contact.granular.parts import (
     TwistingResistance,
 )
 from tisim.effects.contact.granular.spring import carried, midway, projected
+from tisim.effects.contact.overlapping_pairs import OverlappingPairs
 from tisim.errors import Words, must
 from tisim.materials.material_law import MaterialLaw
 from tisim.materials.materials import Touching
@@ -153,22 +154,16 @@ class Granular(ContactGuards, GranularContact):
                 shortest = min(shortest, step)
         return shortest if shortest > 0 else None
 
-    def normal_force(
-        self,
-        state: Mapping[str, np.ndarray],
-        i: np.ndarray,
-        j: np.ndarray,
-        overlap: np.ndarray,
-        effects: Sequence[Effect],
-    ) -> np.ndarray:
-        a, b = state["radius"][i].astype(float), state["radius"][j].astype(float)
-        radius, force = a * b / (a + b), np.full(overlap.shape, np.inf)
-        material = state["material"] if self.several else np.zeros(len(state["radius"]), int)
-        pairs = material[i].astype(int) * self.number_of_materials + material[j].astype(int)
+    def normal_force(self, pairs: OverlappingPairs) -> np.ndarray:
+        radius, force = pairs.reduced_radius, np.full(pairs.overlap.shape, np.inf)
+        material = np.zeros(len(pairs.state["radius"]), int)
+        if self.several:
+            material = pairs.state["material"].astype(int)
+        kinds = material[pairs.i] * self.number_of_materials + material[pairs.j]
         for k, pair in enumerate(self._materials.touching()):
-            own = pairs == k
+            own = kinds == k
             if own.any():
-                force[own] = self.push(pair, radius[own], overlap[own])
+                force[own] = self.push(pair, radius[own], pairs.overlap[own])
         return force
 
     def push(self, pair: Touching, radius: float | np.ndarray, overlap: np.ndarray) -> np.ndarray:
