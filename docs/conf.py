@@ -53,7 +53,7 @@ TYPES = (
 INNER = "|".join(
     (
         r"tisim\.(io\.(recording|trajectory)|packing\.(clump|region|tried_places)|engine\.particle_state|backend\.runtime)\.\w+",
-        r"tisim\.(materials\.materials|components\.component|steppers\.context|state\.(bound|state)|program\.phases|pairs\.(lists|half_list)|engine\.assembly|forces\.force_sum|effects\.contact\.granular\.parts)\.\w+",
+        r"tisim\.(materials\.materials|components\.component|steppers\.context|state\.(bound|state)|program\.phases|pairs\.(lists|half_list)|engine\.assembly|forces\.force_sum|effects\.contact\.(granular\.parts|overlapping_pairs))\.\w+",
         r"tisim\.(effects\.base\.effect\.SceneParts|sources\.magnetic\.mutual_magnetisation\.Magnetised)",
         r"tisim\.sources\.pore_flow\.(solids|pore_flow)\.\w+",
         r"tisim\.notebook\.\w+",
