@@ -19,6 +19,8 @@ _TOGETHER = 0.9
 _COARSE = 0.7
 """Runs at the end of an interval are proposed if the error of a response there is larger than this, in
 uncertainties of the measurement."""
+_EQUAL = 1e-6
+"""Errors count as equal up to this relative difference."""
 _LITTLE = 0.05
 """A gene with a smaller share in the undetermined directions than this is not listed with them."""
 _UNLIKELY = 0.01
@@ -73,7 +75,9 @@ def few_runs(
     wide = np.any(errors > _COARSE, axis=1)
     if not np.any(wide):
         return [], []
-    worst = int(np.argmax(errors.max(axis=0)))
+    # Errors of noise-free quantities are equal to rounding: the first one is named.
+    largest = errors.max(axis=0)
+    worst = int(np.argmax(largest > (1.0 - _EQUAL) * largest.max()))
     words = (
         "Few designs were run near the ends of the intervals: the error of the simulated "
         f"{quantities[worst]} is up to {errors[:, worst].max():.2g} of the measured uncertainty there. Runs "
