@@ -40,16 +40,15 @@ def test_a_scene_of_every_kind_can_begin(name):
         effect.check_start(start, made)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("names", [FAMILIES[:1], pytest.param(FAMILIES[1:], marks=pytest.mark.slow)])
-def test_scenes_of_some_families(tmp_path, names):
+@pytest.mark.slow
+def test_scenes_of_some_families(tmp_path):
     if runtime.current().settings != runtime.Runtime(threads=1).settings:
         pytest.skip("bits are promised of one device, precision and arithmetic")
     other = next((name for name in choice.installed() if name != BACKEND), None)
     if other is None:
         pytest.skip("one backend is installed")
-    theirs = bits_of(other, "world", tmp_path, names)
-    for name in names:
+    theirs = bits_of(other, "world", tmp_path, FAMILIES)
+    for name in FAMILIES:
         mine = bits(scene_of(name), "world")
         assert "reached its end" in mine["ended"]
         assert mine == theirs[name], name

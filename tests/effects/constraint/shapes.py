@@ -177,5 +177,5 @@ def reference(scene, shape, push, time, grip=0.0, contact=gap):
     y = np.concatenate([*(np.asarray(start[name]).ravel() for name in names), np.zeros(3)])
     spin = moments.max() * 100
     scale = np.concatenate([np.full(6, D), np.full(6, 0.1), np.ones(8), np.full(6, spin), np.full(3, D)])
-    end = solve_ivp(rate, (0, time), y, "DOP853", rtol=1e-8, atol=1e-8 * scale, max_step=time / 20)
+    end = solve_ivp(rate, (0, time), y, "DOP853", rtol=1e-7, atol=1e-7 * scale, max_step=time / 20)
     return split(end.y[:, -1])

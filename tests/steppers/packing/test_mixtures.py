@@ -56,12 +56,12 @@ SPHERES_AND_CUBOIDS = HardMixture(rods=(SPHERE,), superquadrics=(CUBOID,))
 )
 def test_an_attempt_equals_its_reference(bodies):
     """Until the first contraction, from deep overlaps on."""
-    made, kinds = mixed(80, 0.08, MechanicalContraction(method="revised"), bodies=bodies), bodies.shapes()
+    made, kinds = mixed(48, 0.08, MechanicalContraction(method="revised"), bodies=bodies), bodies.shapes()
     shapes = [kinds[k] for k in made.start()["shape"].astype(int)]
     side, simulation = made.domain.high[0], Simulation(made, 1)
     simulation.load([made])
     moved = np.zeros(len(kinds))
-    for _ in range(3):
+    for _ in range(2):
         before = {name: np.array(simulation.state[name]) for name in ("position", "orientation")}
         places, orientations = attempt(before, side, shapes, "revised")
         simulation.run(steps=1)
