@@ -116,6 +116,40 @@ def test_simulations_of_an_earlier_start_raise_an_error():
     assert completed.returncode == 0
 
 
+KEPT = """
+import atexit, gc
+from tisim.backend import runtime
+from tisim.backend.layout import Builder
+from tisim.backend.memory import Tree
+from tisim.backend.taichi import ti
+
+def made():
+    builder = Builder()
+    builder.dense(ti.i, 3).place(ti.field(ti.f64))
+    return Tree(builder)
+
+def count():
+    return sum(type(one).__name__ == "SNodeTree" for one in gc.get_objects())
+
+make = runtime.in_taichi_thread(made)
+runtime.init(threads=1)
+kept = [make(), make()]
+runtime.init(threads=1, precision="f32")
+kept.append(make())
+print(count())
+atexit.register(lambda: print(count()))
+"""
+"""Trees of two starts that exist until the process ends. The functions of atexit run after Taichi has
+stopped."""
+
+
+def test_no_tree_outlives_taichi():
+    """A tree would be the last owner of its program, which Quadrants frees on CUDA in Taichi's thread only."""
+    completed = subprocess.run([sys.executable, "-c", KEPT], capture_output=True, text=True, check=True)
+    before, after = map(int, completed.stdout.split())
+    assert (before >= 3, after) == (True, 0)
+
+
 def test_absent_device_is_refused():
     """On a machine without a GPU this is an error; on one with a GPU, it starts."""
     code = (

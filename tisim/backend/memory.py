@@ -171,6 +171,19 @@ def renew() -> None:
         runtime.restart()
 
 
+def _release_all() -> None:
+    """Destroy all trees, those of earlier starts too.
+
+    A tree holds the program of its start. On CUDA, Quadrants 1.4.0 aborts the process if the last owner of a
+    program releases it outside of Taichi's thread, as the interpreter does when it ends.
+    """
+    for tree in list(_live):
+        tree.destroy()
+
+
+runtime.before_stop.append(_release_all)
+
+
 def _release_lost() -> None:
     """Destroy the trees in the queue."""
     while _lost:

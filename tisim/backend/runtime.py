@@ -9,6 +9,7 @@ import io
 import os
 import sys
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,6 +77,8 @@ turn = threading.RLock()
 """Lock held by ``tisim.run``, accuracy studies and searches from start to end, and while settings change.
 Calls of several threads wait for each other; a nested call, for example from a progress function, proceeds.
 """
+before_stop: list[Callable[[], None]] = []
+"""Functions that are called in Taichi's thread before it stops at the end of the process."""
 
 _current: Runtime | None = None
 _generation = 0
@@ -207,6 +210,8 @@ def _stop() -> None:
 
 @in_taichi_thread
 def _reset() -> None:
+    for release in before_stop:
+        release()
     with kernel_cache.exclusive_access():
         ti.reset()
 
