@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.scenes import fixed
-from tisim import Particles, Scene, run
+from tisim import Particles, Scene, Simulation
 from tisim.effects import Contact, ContactDissipation, NearField
 from tisim.operators import AtRest
 
@@ -30,9 +30,36 @@ def cluster(acceleration: float, damping: float = 1e4) -> Scene:
     )
 
 
+SCENES = [cluster(ACCELERATION), cluster(2 * ACCELERATION), cluster(ACCELERATION, damping=0.0)]
+
+
 @pytest.fixture(scope="module")
-def results():
-    return run([cluster(ACCELERATION), cluster(2 * ACCELERATION), cluster(ACCELERATION, damping=0.0)])
+def simulation():
+    compiled = Simulation(SCENES[0], len(SCENES))
+    yield compiled
+    compiled.close()
+
+
+@pytest.fixture(scope="module")
+def results(simulation):
+    simulation.load(SCENES)
+    simulation.run()
+    return simulation.results()
+
+
+def test_a_world_that_has_ended_is_restored_with_the_others(simulation, results, tmp_path):
+    """The last world runs on; the others end before their duration."""
+    simulation.load(SCENES)
+    simulation.run(until=1.5 * results[0].time)
+    simulation.checkpoint(tmp_path / "c.h5")
+    simulation.load(SCENES)
+    simulation.restore(tmp_path / "c.h5")
+    assert [one.time < 20 for one in simulation.results()] == [True] * 3
+    simulation.run()
+    for one, whole in zip(simulation.results(), results, strict=True):
+        assert (one.status, one.time, one.work) == (whole.status, whole.time, whole.work)
+        for name, values in whole.state.items():
+            np.testing.assert_array_equal(one.state[name], values, err_msg=name)
 
 
 def test_ratios_are_over_the_given_acceleration(results):
