@@ -71,6 +71,7 @@ def compared(study: Study, rows: Sequence[PackedRow], free: Sequence[PackedRow] 
     made: Mapping[Study, Any] = {
         "aspect ratio": of_rods,
         "long rods": of_long_rods,
+        "longest rods": of_long_rods,
         "moment of inertia": of_inertia,
         "cylinder": lambda some: of_cylinders(some, free),
         "wedge": lambda some: of_wedges(some, free),

@@ -65,8 +65,9 @@ def drawn(made: Mapping[Study, list[Packing]]) -> dict[str, Figure]:
     made = {study: sorted(some, key=lambda one: one[0].place()) for study, some in made.items()}
     rows = {study: [row for row, _ in some] for study, some in made.items()}
     free = rows.get("aspect ratio", [])
+    long = [*rows.get("long rods", []), *rows.get("longest rods", [])]
     curves_of: dict[str, tuple[Study, Callable[[list[PackedRow]], Figure]]] = {
-        "rods.png": ("aspect ratio", lambda some: curves.of_rods([*some, *rows.get("long rods", [])])),
+        "rods.png": ("aspect ratio", lambda some: curves.of_rods([*some, *long])),
         "inertia.png": ("moment of inertia", curves.of_inertia),
         "superballs.png": ("superballs", curves.of_superballs),
     }

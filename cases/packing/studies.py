@@ -19,7 +19,16 @@ from tisim.geometry import CylindricalContainer, WedgeContainer
 from tisim.geometry import container as containers
 from tisim.shapes.particle_shape import ParticleShape
 
-Study = Literal["aspect ratio", "long rods", "cylinder", "wedge", "superballs", "moment of inertia", "effort"]
+Study = Literal[
+    "aspect ratio",
+    "long rods",
+    "longest rods",
+    "cylinder",
+    "wedge",
+    "superballs",
+    "moment of inertia",
+    "effort",
+]
 STUDIES: tuple[Study, ...] = get_args(Study)
 ASPECTS = (1.0, 1.1, 1.25, 1.4, 1.5, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
 """Aspect ratios Lambda of rods in a periodic box."""
@@ -27,6 +36,8 @@ REVISED_ASPECTS = (1.0, 1.5, 3.0, 5.0, 10.0)
 """Aspect ratios that are also packed by the revised method."""
 LONG_ASPECTS = (25.0, 50.0)
 """Aspect ratios of long rods, for which B16 finds phi L/D = 5."""
+LONGEST_ASPECTS = (100.0, 150.0)
+"""Aspect ratios of longer rods: minutes on a graphics card, some hours on one core."""
 CYLINDER_ASPECTS = (1.0, 3.0)
 """Aspect ratios in a cylinder."""
 WIDTHS = (1.1, 1.4, 1.67, 1.9, 2.05, 2.3, 2.6, 3.1, 4.5, 8.0)
@@ -171,7 +182,9 @@ def plans(study: Study) -> list[PackedPlan]:
         both = (("original", ASPECTS), ("revised", REVISED_ASPECTS))
         return [PackedPlan(study, one, method) for method, aspects in both for one in aspects]
     if study == "long rods":
-        return [long_rods(one) for one in LONG_ASPECTS]
+        return [long_rods(study, one) for one in LONG_ASPECTS]
+    if study == "longest rods":
+        return [long_rods(study, one) for one in LONGEST_ASPECTS]
     if study == "cylinder":
         # In a file, overlaps vanish by diffusion from body to body, so short files need far fewer attempts.
         return [
@@ -203,16 +216,16 @@ def plans(study: Study) -> list[PackedPlan]:
     return [PackedPlan(study, one, "revised", number=100, limit=500) for one in EXPONENTS]
 
 
-def long_rods(aspect: float) -> PackedPlan:
+def long_rods(study: Study, aspect: float) -> PackedPlan:
     """Return a packing of long rods.
 
     Its start and its first step of the volume are in proportion to the end, where the packing fraction is
     about 5/Lambda. Smaller steps end less densely, as their attempts are spent on the way: with a third of
     this step and 100 attempts, rods of Lambda = 25 ended at 0.145.
     """
-    number = PackedPlan("long rods", aspect).least_number(1)
+    number = PackedPlan(study, aspect).least_number(1)
     end = number * rod(aspect).volume() * aspect / 5.0
-    return PackedPlan("long rods", aspect, start=2.0 / aspect, step=1e-3 * end, limit=1000, number=number)
+    return PackedPlan(study, aspect, start=2.0 / aspect, step=1e-3 * end, limit=1000, number=number)
 
 
 def shortest(aspect: float, angle: float) -> float:

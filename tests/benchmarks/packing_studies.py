@@ -1,20 +1,20 @@
 """Make the packings of B16 chapters 2 to 4, print their numbers beside the published ones, and draw their
 figures: the tables and figures of docs/packing_study.md.
 
-    python -m tests.benchmarks.packing_studies FOLDER [STUDY ...]
+    python -m tests.benchmarks.packing_studies FOLDER [STUDY ...] [--device cpu] [--threads 1]
 
-Each packing is added to FOLDER/STUDY.csv as it ends, and is not made again, so a command that was stopped
-goes on where it was.
+Without a STUDY, all are made but the longest rods, which are for a graphics card. Each packing is added to
+FOLDER/STUDY.csv as it ends, and is not made again, so a command that was stopped goes on where it was.
 """
 
-import sys
+import argparse
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
-import tisim
 from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.backend import runtime
 from tisim.cases.packing.comparisons import compared
 from tisim.cases.packing.figures import drawn, starts_of
 from tisim.cases.packing.studies import STUDIES, PackedRow, measured_packings, plan_of, plans, read, table
@@ -53,12 +53,20 @@ def packings(study, folder):
     return made
 
 
-def main(folder, *studies):
+def main():
     """Make some studies, or all, and print and draw all that are there."""
-    tisim.init(threads=1)
-    place = Path(folder)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument("folder", type=Path)
+    options.add_argument("studies", nargs="*", metavar="STUDY", choices=[[], *STUDIES])
+    options.add_argument("--device", default="cpu", choices=runtime.DEVICES)
+    options.add_argument("--threads", type=int, default=1)
+    given = options.parse_args()
+    runtime.init(given.device, threads=given.threads)
+    place = given.folder
     place.mkdir(exist_ok=True)
-    for study in studies or STUDIES:
+    for study in given.studies or [one for one in STUDIES if one != "longest rods"]:
         pack(study, place)
     made = {study: packings(study, place) for study in STUDIES if (place / f"{study}.csv").exists()}
     free = [row for row, _ in made.get("aspect ratio", [])]
@@ -71,4 +79,4 @@ def main(folder, *studies):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()
