@@ -144,7 +144,7 @@ stopped."""
 
 
 def test_no_tree_outlives_taichi():
-    """A tree would be the last owner of its program, which Quadrants frees on CUDA in Taichi's thread only."""
+    """A tree would be the last owner of its program, which must be freed in Taichi's thread on CUDA."""
     completed = subprocess.run([sys.executable, "-c", KEPT], capture_output=True, text=True, check=True)
     before, after = map(int, completed.stdout.split())
     assert (before >= 3, after) == (True, 0)
