@@ -81,6 +81,7 @@ def test_the_start_farthest_from_balance_is_judged(monkeypatch):
     assert not found.ok
 
 
+@pytest.mark.slow
 def test_figures_show_all_valves():
     throats, fields = runs.by_throat(2), runs.by_field(2)
     rows = figures.table([*throats, *fields]).splitlines()

@@ -129,6 +129,7 @@ def test_resonance_curve_of_runs_follows_the_closed_form():
     assert rows[1].split(",")[0] == "one"
 
 
+@pytest.mark.slow
 def test_the_spectrum_of_a_report_has_the_lines_of_the_closed_form(tmp_path):
     """Of a recorded run; a page shows it with its units and the expected frequencies."""
     driven = vibration.scene(0.9 * FAST / vibration.CYCLOTRON, "none", 0.4, sites=1, observed=True)

@@ -65,7 +65,7 @@ def test_near_an_end_of_the_range_intervals_are_one_sided():
     assert inside.mean() > 0.92
 
 
-@pytest.mark.parametrize(("sets", "close"), [(40, 80), pytest.param(200, 170, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("sets", "close"), [(20, 80), pytest.param(200, 170, marks=pytest.mark.slow)])
 def test_designs_that_crowd_around_the_best_do_not_narrow_intervals(sets, close):
     """The slopes of heap and rate are lost in the noise of the crowd, and are known from the other designs.
 

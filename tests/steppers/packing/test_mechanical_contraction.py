@@ -326,6 +326,7 @@ def test_orientations_of_a_start_are_random_unless_given():
     assert np.abs(other - made.start()["orientation"]).max() > 0.1
 
 
+@pytest.mark.slow
 def test_a_run_that_never_removes_the_overlaps_of_its_start_fails():
     result = run(scene(ROD, 100, 0.3, duration=3.0, method="original"))
     assert result.status.failed
