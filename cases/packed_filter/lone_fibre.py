@@ -23,16 +23,16 @@ from scipy.spatial.transform import Rotation
 from tisim import Box, run
 from tisim.analysis import Mean
 from tisim.cases.common.runs import sound
+from tisim.cases.packed_filter.measures import SIZE_CLASSES, size_classes
 from tisim.cases.packed_filter.scene import PackedFilter, magnetised
 from tisim.engine.batches import Progress
 from tisim.sources import Cylinder
+from tisim.sources.switched import NO_END
 
 START_MARGIN = 5.0
 """Distance from the fibre within which colloids start, D. Fibres attract them from less than that."""
 LONE_RESOLUTION = 3.0
 """Largest number of cells over D of the flow around a lone fibre."""
-SIZE_CLASSES = 6
-"""Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,7 @@ class LoneFibre:
         time : from the start of the run, s. fibres : per volume (1/m^3), or per area (1/m^2), that a colloid
         meets in each of a number of stages; 1 for exp(-n V), more for (1 - n V)^stages.
         """
-        edges = np.quantile(self.radius, np.linspace(0, 1, SIZE_CLASSES + 1))
-        kind = np.clip(np.searchsorted(edges, self.radius, side="right") - 1, 0, SIZE_CLASSES - 1)
+        kind = size_classes(self.radius)
         caught = (self.captured_at >= 0) & (self.captured_at <= time)
         size = self.size[:, None]
         # The jackknife over fibres gives the interval of a mean that is no linear function of them.
@@ -92,7 +91,10 @@ def lone_fibres(
     )
     own = np.pi / 4 * matrix.diameter**2 * matrix.length
     size = 8 * half**3 - own if filter.mode == "static" else 4 * half**2
-    coarse = replace(filter, resolution=min(filter.resolution, LONE_RESOLUTION))
+    # The field remains on, as a released colloid would count as one that was never captured.
+    coarse = replace(
+        filter, resolution=min(filter.resolution, LONE_RESOLUTION), adhering=None, field_end=NO_END
+    )
     scenes = []
     for k, axis in enumerate(axes):
         body = Cylinder(axis=tuple(axis.tolist()), radius=matrix.diameter / 2, length=matrix.length)

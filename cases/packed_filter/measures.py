@@ -9,6 +9,9 @@ from tisim.accuracy import Quantity
 from tisim.analysis import particle_balance
 from tisim.sources import PoreFlow
 
+SIZE_CLASSES = 6
+"""Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
+
 
 def matrix_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower and the upper corner of the box of the matrix, m."""
@@ -42,6 +45,30 @@ def penetration(result: Result, which: np.ndarray | None = None) -> float:
     return float((some == 0).mean()) if len(some) else 1.0
 
 
+def size_classes(radius: np.ndarray) -> np.ndarray:
+    """Return the class by size of each colloid, 0 for the smallest, of the same shape as ``radius`` (m)."""
+    edges = np.quantile(radius, np.linspace(0, 1, SIZE_CLASSES + 1))
+    return np.clip(np.searchsorted(edges, radius, side="right") - 1, 0, SIZE_CLASSES - 1)
+
+
+def penetration_of_layers(result: Result, layers: float, which: np.ndarray | None = None) -> float:
+    """Return the fraction of the colloids, or of some of them, that would pass a number of such matrices in a
+    row.
+
+    Layers are taken to capture independently of each other, those of a class by size with the same
+    probability: the mean over the classes of P^layers. Small colloids pass more often than large ones, so the
+    mean of all to this power would be too small.
+    """
+    chosen = inside(result) if which is None else inside(result) & which
+    if not chosen.any():
+        return 1.0
+    kind = np.full(len(chosen), -1)
+    kind[chosen] = size_classes(result.state["radius"][chosen])
+    classes, numbers = np.unique(kind[chosen], return_counts=True)
+    passing = [penetration(result, kind == one) ** layers for one in classes]
+    return float(np.average(passing, weights=numbers))
+
+
 def released_fraction(result: Result) -> float:
     """Return the number of releases over the number of captures."""
     return result.work["releases"] / result.work["captures"]
@@ -61,5 +88,6 @@ def pressure_drop(result: Result) -> float:
 
 
 def quantities(scene: Scene) -> tuple[Quantity, ...]:
-    """Return the quantity of ``tisim cost``: the captured fraction, as paths of colloids are random."""
-    return (Quantity("captured fraction", captured_fraction, random=True),)
+    """Return the quantity of ``tisim cost``: the fraction that is ever captured, as paths of colloids are
+    random."""
+    return (Quantity("captured fraction", lambda result: 1 - penetration(result), random=True),)

@@ -9,11 +9,13 @@ captured fractions of both is maximised.
 
 The field remains on, and the field and the flow of each design are resolved between its fibres. The matrix is
 one cube of a packing, whose side ``depth`` differs between designs. Captured fraction and pressure drop are
-taken to a matrix of the depth ``DEPTH``: the fraction that passes is P^(DEPTH/depth), as if layers captured
-independently of each other, and the pressure drop is proportional to the depth.
+taken to a matrix of the depth ``DEPTH``: the fraction that passes is P^(DEPTH/depth) in each class of
+colloids by size, as if layers captured independently of each other, and the pressure drop is proportional to
+the depth.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,12 @@ import numpy as np
 from tisim import Result, Scene
 from tisim.cases.case import searched_size
 from tisim.cases.packed_filter.matrix import Matrix
-from tisim.cases.packed_filter.measures import captured_fraction, matrix_box, penetration, pressure_drop
+from tisim.cases.packed_filter.measures import (
+    captured_fraction,
+    matrix_box,
+    penetration_of_layers,
+    pressure_drop,
+)
 from tisim.cases.packed_filter.pictures import caught
 from tisim.cases.packed_filter.scene import MEAN_RADIUS, SIZES, TITLE, PackedFilter
 from tisim.errors import must
@@ -59,11 +66,14 @@ MEANINGS = {
     "speed": "superficial velocity of the water",
 }
 SEARCHED: dict[str, dict[str, Any]] = {
-    "small": {"number": 100, "cells": (24, 24, 48), "digits": None},
-    "default": {"number": 300, "cells": (36, 36, 72)},
+    "small": {"number": 100, "resolution": 3.0, "digits": None},
+    "default": {"number": 300, "resolution": 4.5},
 }
-"""Colloids of a run, cells of its flow and the sum of its field, by size. All designs have the same, so that
-they are run as batches. An octree for each design does not pay for some hundred colloids."""
+"""Colloids of a run, least number of cells of its flow over D and the sum of its field, by size. An octree
+for each design does not pay for some hundred colloids."""
+GRIDS = ((24, 24, 48), (36, 36, 72), (48, 48, 96), (60, 60, 120))
+"""Grids of the flow. A design has the coarsest one with ``resolution``; designs of one grid can be run as one
+batch."""
 MORE_COLLOIDS = {"pressure": 1, "select": 4}
 """Factor of the number of colloids by variant: the difference of two fractions is noisier than a fraction.
 With 100 colloids its standard deviation between starts is 0.15, with 400 it is 0.07."""
@@ -80,7 +90,7 @@ def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedF
     matrix = Matrix(design["diameter"], aspect, fraction, seed=seed, width=max(Matrix.width, float(width)))
     speed = design.get("speed", SPEED)
     transit = (matrix.depth + 2 * matrix.length + matrix.diameter) / speed
-    return PackedFilter(
+    made = PackedFilter(
         matrix,
         "dynamic",
         flux=design["flux"],
@@ -89,6 +99,14 @@ def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedF
         duration=TRANSITS * transit,
         **settings,
     )
+    return replace(made, cells=grid(made))
+
+
+def grid(filter: PackedFilter) -> tuple[int, int, int]:
+    """Return the coarsest grid with the resolution of a filter, or the finest."""
+    low, high = filter.stretch(filter.box())
+    least = filter.resolution * (np.array(high) - low) / filter.matrix.diameter
+    return next((one for one in GRIDS if (np.array(one) >= least).all()), GRIDS[-1])
 
 
 def depth(result: Result) -> float:
@@ -99,7 +117,7 @@ def depth(result: Result) -> float:
 
 def captured(result: Result, which: np.ndarray | None = None) -> float:
     """Return the captured fraction of the colloids, or of some of them, in a matrix of depth DEPTH."""
-    return float(1 - penetration(result, which) ** (DEPTH / depth(result)))
+    return 1 - penetration_of_layers(result, DEPTH / depth(result), which)
 
 
 def pressure(result: Result) -> float:

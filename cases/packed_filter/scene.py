@@ -104,7 +104,7 @@ class PackedFilter:
     and z are given. feed : time until which colloids enter, s. field_end : time at which the field is
     switched off, s. adhering : fraction of captured colloids that are never released; None for captures that
     last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
-    duration : of the run, s.
+    duration : of the run, s. longest_move : largest displacement of a colloid in a step, D.
     """
 
     matrix: Matrix = field(default_factory=Matrix)
@@ -123,6 +123,7 @@ class PackedFilter:
     polydispersity: float = POLYDISPERSITY
     number: int = 1000
     duration: float = 60.0
+    longest_move: float = LONGEST_MOVE
 
     @property
     def pore_speed(self) -> float:
@@ -264,8 +265,8 @@ class PackedFilter:
         return Release(adhering=self.adhering, temperature=WATER_TEMPERATURE)
 
     def stepper(self) -> Brownian:
-        """Return the stepper, whose steps move a colloid by at most LONGEST_MOVE."""
-        move = LONGEST_MOVE * self.matrix.diameter
+        """Return the stepper, whose steps move a colloid by at most ``longest_move``."""
+        move = self.longest_move * self.matrix.diameter
         diffusion = Boltzmann * WATER_TEMPERATURE / (6 * np.pi * WATER_VISCOSITY * self.mean_radius)
         longest = min(move**2 / (2 * diffusion), move / self.pore_speed if self.mode == "dynamic" else np.inf)
         return Brownian(

@@ -4,7 +4,7 @@
 
 Diameters are in lengths of a rod with its caps. Each line has means over packings with 95 % intervals: of the
 fraction that passes the matrix, and of the captured fraction and the pressure drop of 10 mm, as if layers
-captured independently of each other.
+captured independently of each other, each class of colloids by size with a probability of its own.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ import argparse
 import sys
 from pathlib import Path
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tisim.analysis import Mean
 from tisim.cases.packed_filter.checks import SLOW, runs, stream
-from tisim.cases.packed_filter.measures import missing, penetration, pressure_drop
+from tisim.cases.packed_filter.measures import missing, penetration, penetration_of_layers, pressure_drop
 from tisim.cases.packed_filter.problem import DEPTH
 
 
@@ -35,10 +33,11 @@ def main() -> None:
         filter = stream(SLOW, tube=tube)
         results = runs(filter, options.packings)
         assert missing(results) == 0
-        passed = np.array([penetration(one) for one in results])
+        passed = Mean.of([penetration(one) for one in results])
         layers = DEPTH / filter.matrix.depth
         pressure = Mean.of([pressure_drop(one) * layers for one in results])
-        numbers = f"{Mean.of(passed)!s:18} {Mean.of(1 - passed**layers)!s:18} {pressure}"
+        captured = Mean.of([1 - penetration_of_layers(one, layers) for one in results])
+        numbers = f"{passed!s:18} {captured!s:18} {pressure}"
         print(f"{tube or 'none':>8} {filter.matrix.number:>6}  {numbers}", flush=True)
 
 
