@@ -263,7 +263,7 @@ def near_cubes():
     shape, start = superball(20.0), 0.2
     steppers = contraction(method="revised", attempts=200), minimisation(precision=1e-2, patience=100)
     settled = each_in([at_random(shape, 40, start, one) for one in steppers])
-    # Trial moves that overlap deeply are searched from 16 directions each, so this is a short run.
+    # Trial moves that overlap deeply are searched from 17 directions each, so this is a short run.
     growing = each_in([at_random(shape, 40, start, growth(), duration=300.0)])
     packed = fractions(settled)
     least = min(*packed, *fractions(growing)) / start
