@@ -11,6 +11,9 @@ from tisim.sources import PoreFlow
 
 SIZE_CLASSES = 6
 """Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
+LAYER_CLASSES = 3
+"""The same where a power of the part that passes is taken of single runs: more classes hardly change it, and
+the noise of fewer colloids in each would make it too large."""
 
 
 def matrix_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -45,10 +48,13 @@ def penetration(result: Result, which: np.ndarray | None = None) -> float:
     return float((some == 0).mean()) if len(some) else 1.0
 
 
-def size_classes(radius: np.ndarray) -> np.ndarray:
-    """Return the class by size of each colloid, 0 for the smallest, of the same shape as ``radius`` (m)."""
-    edges = np.quantile(radius, np.linspace(0, 1, SIZE_CLASSES + 1))
-    return np.clip(np.searchsorted(edges, radius, side="right") - 1, 0, SIZE_CLASSES - 1)
+def size_classes(radius: np.ndarray, number: int = SIZE_CLASSES) -> np.ndarray:
+    """Return the class by size of each colloid, 0 for the smallest, of the same shape as ``radius`` (m).
+
+    number : of classes.
+    """
+    edges = np.quantile(radius, np.linspace(0, 1, number + 1))
+    return np.clip(np.searchsorted(edges, radius, side="right") - 1, 0, number - 1)
 
 
 def penetration_of_layers(result: Result, layers: float, which: np.ndarray | None = None) -> float:
@@ -63,7 +69,7 @@ def penetration_of_layers(result: Result, layers: float, which: np.ndarray | Non
     if not chosen.any():
         return 1.0
     kind = np.full(len(chosen), -1)
-    kind[chosen] = size_classes(result.state["radius"][chosen])
+    kind[chosen] = size_classes(result.state["radius"][chosen], LAYER_CLASSES)
     classes, numbers = np.unique(kind[chosen], return_counts=True)
     passing = [penetration(result, kind == one) ** layers for one in classes]
     return float(np.average(passing, weights=numbers))

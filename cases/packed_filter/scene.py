@@ -56,8 +56,8 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 1e-9, 20e-9
 IMAGE_REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
 LONGEST_MOVE = 0.02
-"""Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D. Captures are found at
-the ends of steps: with 0.05, 3 % more colloids pass (docs/packed_filter.md)."""
+"""Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D. Captures are found
+at the ends of steps: with 0.05, 3 % more colloids pass (docs/packed_filter.md)."""
 FIELD_DIGITS = 2
 """Number of digits of the field, or of the table of a fibre; random motion outweighs this error."""
 APPROACH = 1.0

@@ -101,13 +101,15 @@ def test_objectives_are_taken_to_one_depth():
 
 
 def test_layers_capture_each_size_with_its_own_probability():
-    """All of the smaller half pass, and a third of the larger one, so 1/2 + 1/2 3^-4 pass four layers; the
-    mean of all to this power would be (2/3)^4."""
+    """All of the smaller half pass, and a third of the larger one. The mean of all to the fourth power would
+    be (2/3)^4."""
     n = 10 * SIZE_CLASSES
     caught = [k if k >= n // 2 and k % 3 else -1 for k in range(n)]
     result = ended(caught, radius=np.linspace(1e-9, 9e-9, n))
     assert penetration(result) == pytest.approx(2 / 3)
-    assert penetration_of_layers(result, 4.0) == pytest.approx(0.5 + 0.5 / 3**4, rel=0.05)
+    # The middle class has both halves.
+    expected = (1.0 + (2 / 3) ** 4 + (1 / 3) ** 4) / 3
+    assert penetration_of_layers(result, 4.0) == pytest.approx(expected, rel=0.05)
     assert penetration_of_layers(result, 1.0) == pytest.approx(2 / 3)
     only = np.arange(n) < n // 2
     assert penetration_of_layers(result, 4.0, only) == 1.0
