@@ -30,7 +30,7 @@ WAITS = (10.0, 60.0, 180.0)
 SLOW, FAST = 1e-4, 4e-4
 """Superficial velocities of dynamic separation, of B16's ratio of 4 (section 7.4.2), m/s."""
 COLLOIDS = 400
-OWN_COLLOIDS = {"mean_radius": 2.95e-9, "polydispersity": 0.475, "flux": 1.5}
+OWN_COLLOIDS: dict[str, Any] = {"mean_radius": 2.95e-9, "polydispersity": 0.475, "flux": 1.5}
 """Colloids that B16 synthesised, and the field, of the dynamic separation (sections 7.4.1, 7.4.2)."""
 
 
