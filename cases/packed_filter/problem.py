@@ -71,7 +71,7 @@ SEARCHED: dict[str, dict[str, Any]] = {
 }
 """Colloids of a run, least number of cells of its flow over D and the sum of its field, by size. An octree
 for each design does not pay for some hundred colloids."""
-GRIDS = ((24, 24, 48), (36, 36, 72), (48, 48, 96), (60, 60, 120))
+FLOW_GRIDS = ((24, 24, 48), (36, 36, 72), (48, 48, 96), (60, 60, 120))
 """Grids of the flow. A design has the coarsest one with ``resolution``; designs of one grid can be run as one
 batch."""
 MORE_COLLOIDS = {"pressure": 1, "select": 4}
@@ -106,7 +106,7 @@ def grid(filter: PackedFilter) -> tuple[int, int, int]:
     """Return the coarsest grid with the resolution of a filter, or the finest."""
     low, high = filter.stretch(filter.box())
     least = filter.resolution * (np.array(high) - low) / filter.matrix.diameter
-    return next((one for one in GRIDS if (np.array(one) >= least).all()), GRIDS[-1])
+    return next((one for one in FLOW_GRIDS if (np.array(one) >= least).all()), FLOW_GRIDS[-1])
 
 
 def depth(result: Result) -> float:

@@ -149,7 +149,7 @@ def test_designs_have_enough_fibres_and_cells():
         low_corner, high_corner = one.stretch(one.box())
         least = 3.0 * (np.array(high_corner) - low_corner) / one.matrix.diameter
         assert (np.array(one.cells) >= least).all()
-        coarser = problem.GRIDS[: problem.GRIDS.index(one.cells)]
+        coarser = problem.FLOW_GRIDS[: problem.FLOW_GRIDS.index(one.cells)]
         assert not any((np.array(other) >= least).all() for other in coarser)
     assert first.matrix.sides[0] >= 2 * (first.matrix.length + first.matrix.diameter)
     faster = problem.designed({**high, "speed": 1e-3}, 0, **problem.SEARCHED["small"])
