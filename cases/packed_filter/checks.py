@@ -110,8 +110,8 @@ def of_dynamic(
 
 
 def of_fibres(filter: PackedFilter, results: Sequence[Result], starts: int) -> Iterator[Claim | Shown]:
-    """The matrix beside single fibres, the cascade, a uniform flow, and fibres that do not magnetise each
-    other."""
+    """The matrix beside single fibres, the cascade, a uniform flow, fibres that do not magnetise each
+    other, and other steps."""
     passing = np.array([penetration(one) for one in results])
     matrix, lone = filter.matrix, lone_fibres(filter, LONE_FIBRES)
     yield Shown(
@@ -124,9 +124,12 @@ def of_fibres(filter: PackedFilter, results: Sequence[Result], starts: int) -> I
     yield Shown(
         "passed, matrix", Mean.of(passing), f"cascade: {still.passed(np.inf, matrix.density, stages)}"
     )
-    for name, setting in (
+    others: tuple[tuple[str, dict[str, Any]], ...] = (
         ("in a uniform flow", {"flow": "uniform"}),
         ("without mutual magnetisation", {"mutual": False}),
-    ):
+        ("with steps of 0.05 D", {"longest_move": 0.05}),
+        ("with steps of 0.01 D", {"longest_move": 0.01}),
+    )
+    for name, setting in others:
         other = np.array([penetration(one) for one in runs(stream(SLOW, **setting), starts)])
         yield Shown(f"passed, {name}, minus matrix", Mean.of(other - passing))

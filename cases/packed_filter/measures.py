@@ -12,8 +12,8 @@ from tisim.sources import PoreFlow
 SIZE_CLASSES = 6
 """Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
 LAYER_CLASSES = 3
-"""The same where a power of the part that passes is taken of single runs: more classes hardly change it, and
-the noise of fewer colloids in each would make it too large."""
+"""Classes of equal numbers of colloids by size in which layers capture. The colloids of a single run allow no
+more: their noise makes a power of the fraction that passes too large."""
 
 
 def matrix_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

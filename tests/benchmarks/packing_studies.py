@@ -53,13 +53,20 @@ def packings(study, folder):
     return made
 
 
+def study_of(name):
+    """The study of this name, on the command line."""
+    if name not in STUDIES:
+        raise argparse.ArgumentTypeError(f"STUDY must be one of {', '.join(STUDIES)}; received {name!r}")
+    return name
+
+
 def main():
     """Make some studies, or all, and print and draw all that are there."""
     options = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     options.add_argument("folder", type=Path)
-    options.add_argument("studies", nargs="*", metavar="STUDY", choices=[[], *STUDIES])
+    options.add_argument("studies", nargs="*", metavar="STUDY", type=study_of)
     options.add_argument("--device", default="cpu", choices=runtime.DEVICES)
     options.add_argument("--threads", type=int, default=1)
     given = options.parse_args()

@@ -187,7 +187,7 @@ def _check_times(columns: Columns, own: Columns, worlds: int) -> None:
     must(same, "checkpoint's seed", f"{seed.tolist()}", columns["seed"][:worlds].tolist())
     # A world that has ended before its duration, at rest for example, has an earlier end.
     saved, time = columns["end"][:worlds], columns["time"][:worlds]
-    ended = (saved < end) & (time >= saved * (1 - ROUNDED_PART))
+    ended = (saved >= 0) & (saved < end) & (time >= saved * (1 - ROUNDED_PART))
     rule = f"{end.tolist()}, or the time at which a world ended before"
     must(bool(((saved == end) | ended).all()), "checkpoint's end", rule, saved.tolist())
     _within(columns, "time", 0.0, float(end.max(initial=0.0)) * (1 + ROUNDED_PART))
