@@ -103,10 +103,12 @@ def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedF
 
 
 def grid(filter: PackedFilter) -> tuple[int, int, int]:
-    """Return the coarsest grid with the resolution of a filter, or the finest."""
+    """Return the coarsest grid with the resolution of a filter; InputError if none has it."""
     low, high = filter.stretch(filter.box())
     least = filter.resolution * (np.array(high) - low) / filter.matrix.diameter
-    return next((one for one in FLOW_GRIDS if (np.array(one) >= least).all()), FLOW_GRIDS[-1])
+    finest = filter.resolution * float((np.array(FLOW_GRIDS[-1]) / least).min())
+    must(finest >= filter.resolution, "resolution", f"at most {finest:.3g} cells over D", filter.resolution)
+    return next(one for one in FLOW_GRIDS if (np.array(one) >= least).all())
 
 
 def depth(result: Result) -> float:

@@ -137,6 +137,7 @@ FORGED = {
     "time's rounding": ("time_carry", lambda a: np.full_like(a, 1e-3), "between"),
     "end, later": ("end", lambda a: 2 * a, r"\[0.0004\], or the time at which a world ended before"),
     "end, of a world that goes on": ("end", lambda a: 0.9 * a, r"\[0.0004\]"),
+    "end, negative": ("end", lambda a: -a, r"\[0.0004\]"),
     "end, not finite": ("end", lambda a: np.full_like(a, np.nan), r"\[0.0004\]"),
     "seed": ("seed", lambda a: a + 1, r"\[3\]"),
     "steps": ("steps", lambda a: -a, "between 0 and"),

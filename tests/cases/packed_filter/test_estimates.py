@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tisim import Box
+from tisim import Box, InputError
 from tisim.analysis import Mean
 from tisim.cases.packed_filter import figures, problem
 from tisim.cases.packed_filter.lone_fibre import LoneFibre, lone_fibres
@@ -152,6 +152,8 @@ def test_designs_have_enough_fibres_and_cells():
         coarser = problem.FLOW_GRIDS[: problem.FLOW_GRIDS.index(one.cells)]
         assert not any((np.array(other) >= least).all() for other in coarser)
     assert first.matrix.sides[0] >= 2 * (first.matrix.length + first.matrix.diameter)
+    with pytest.raises(InputError, match=r"resolution must be at most [\d.]+ cells over D; received 9"):
+        problem.designed(high, 0, resolution=9.0)
     faster = problem.designed({**high, "speed": 1e-3}, 0, **problem.SEARCHED["small"])
     assert faster.duration == pytest.approx(second.duration * problem.SPEED / 1e-3)
 
