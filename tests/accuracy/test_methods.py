@@ -394,6 +394,7 @@ def test_whole_numbers_remain_whole():
     assert named == ["attempts=12", "attempts=1234"]
 
 
+@pytest.mark.slow
 def test_packing_steppers_are_compared_with_each_other():
     """The energy minimisation alone converges, to the jamming density of a start, and is the reference."""
     tried = methods_of(packing.scene_for("small", 0))

@@ -47,6 +47,7 @@ def test_another_objective_in_the_file_is_another_search(tisim, own_file):
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_another_law_in_the_file_is_other_physics(tisim, own_file):
     text = LAW + PROBLEM.replace("duration=2e-3", "duration=2e-3,\n        effects=(Pull(strength=1e-9),)")
     own_file("my_drift.py", text)

@@ -70,7 +70,11 @@ def twin(one, gaps):
 
 
 @pytest.mark.parametrize(
-    ("shapes", "gaps"), [((ROD, BALL), rod_gaps), ((BRICK, EGG), superquadric_gaps)], ids=["rods", "bricks"]
+    ("shapes", "gaps"),
+    [
+        pytest.param((ROD, BALL), rod_gaps, id="rods"),
+        pytest.param((BRICK, EGG), superquadric_gaps, id="bricks", marks=pytest.mark.slow),
+    ],
 )
 def test_the_deepest_overlap_is_told(rng, shapes, gaps):
     """Of random bodies of two shapes and of unlike sizes in a periodic box, as by a search over all pairs."""

@@ -34,6 +34,7 @@ def across(time):
     return {name: 90.0 for name in ANGLES} | {name: time for name in TIMES}
 
 
+@pytest.mark.slow
 def test_the_capture_time_is_the_one_of_the_cascade():
     """A cascade with equal stages of fibres across the field is B16's optimal cascade."""
     found = capture_time(across(40.0), seed=3)

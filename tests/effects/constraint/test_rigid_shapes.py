@@ -240,6 +240,7 @@ def test_restitution_holds_wherever_a_body_hits_a_floor(name):
     assert ease > 1.05 / mass
 
 
+@pytest.mark.slow
 def test_a_rod_hits_another_head_on_with_the_restitution_of_the_material():
     """End to end and across, at the centres, where nothing turns."""
     for turn, apart in ((LYING, 5 * D), ((1.0, 0, 0, 0), D)):

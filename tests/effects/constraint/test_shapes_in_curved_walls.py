@@ -224,6 +224,7 @@ def test_an_ellipsoid_comes_to_rest_in_a_cylinder():
     assert np.linalg.norm(by_id(result)["velocity"]) < 5e-3
 
 
+@pytest.mark.slow
 def test_a_body_at_a_rim_or_outside_a_cone_stops_the_world():
     short = CylindricalSurface(start=(0, 0, 0), end=(0, 0, 0.02), radius=R)
     cone = ConicalSurface(start=(FAR, 0, 0), end=(FAR, 0, 0.02), start_radius=R, end_radius=D)
