@@ -149,6 +149,10 @@ def test_a_list_of_rows_varies_in_number_too():
     with pytest.raises(InputError) as fault:
         SampleList(rows=3)
     assert str(fault.value) == "sample_list.rows must be a list; received 3"
+    for kind in (SampleList, SampleFilledList):
+        rule = "must be a list or tuple of sample_row; received SampleRow"
+        with pytest.raises(InputError, match=f"^{kind.kind()}.rows {rule}"):
+            kind(rows=SampleRow(radius=1))
 
 
 def test_must():

@@ -7,6 +7,7 @@ from scipy.special import gamma
 
 from tests.shapes.pairs import spiral
 from tisim import InputError
+from tisim.effects import HardRods, HardSuperquadrics, RigidRods, RigidSuperquadrics
 from tisim.shapes import EllipsoidShape, SphereShape, SpherocylinderShape, SuperquadricShape
 
 SHAPES = (
@@ -176,6 +177,30 @@ def test_kernels_know_each_shape_as_a_rod_or_a_superquadric():
 def test_shapes_without_a_strictly_convex_body_are_refused(shape, settings, message):
     with pytest.raises(InputError, match=message):
         shape(**settings)
+
+
+def test_effects_take_shapes_of_any_class_that_have_their_form():
+    """Spheres are rods and superquadrics, and ellipsoids are superquadrics."""
+    sphere, ellipsoid = SphereShape(diameter=2.0), EllipsoidShape(semi_axes=(1.0, 2.0, 3.0))
+    rod = SpherocylinderShape(length=1.0, diameter=0.5)
+    for kind in (HardRods, RigidRods):
+        given = [sphere, {"length": 3, "diameter": 1}, rod]
+        assert kind(rods=given).rods == (
+            SpherocylinderShape(length=0.0, diameter=2.0), SpherocylinderShape(length=3.0, diameter=1.0), rod
+        )  # fmt: skip
+        rule = "must be a spherocylinder_shape, or a shape of the form of one; received EllipsoidShape"
+        with pytest.raises(InputError, match=rf"^{kind.kind()}.rods\[1\] {rule}"):
+            kind(rods=(rod, ellipsoid))
+    ball, axes = ((1.0,) * 3, (2.0,) * 3), (1.0, 2.0, 3.0)
+    known = SuperquadricShape(semi_axes=axes, exponents=(3, 3, 3))
+    for kind in (HardSuperquadrics, RigidSuperquadrics):
+        made = kind(superquadrics=(sphere, ellipsoid, known)).superquadrics
+        assert [one.superquadric() for one in made] == [ball, (axes, (2.0,) * 3), (axes, (3.0,) * 3)]
+        rule = "must be a superquadric_shape, or"
+        with pytest.raises(InputError, match=rf"^{kind.kind()}.superquadrics\[0\] {rule}"):
+            kind(superquadrics=[rod])
+    with pytest.raises(InputError, match=r"^hard_rods.rods.1.length must be given"):
+        HardRods(rods=[sphere, {"diameter": 1}])
 
 
 def test_surface_points_need_a_number():

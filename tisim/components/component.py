@@ -109,6 +109,15 @@ class Component(Checked):
             rule = "decorated with ti.func, as in its contract"
             must(not promised or is_device_function(own), f"{cls.__name__}.{name}", rule, type(own).__name__)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _are_lists(cls, data: Any) -> Any:
+        """Raise InputError if a part is given in place of a list of such parts."""
+        for name, kind in cls.lists() if isinstance(data, Mapping) else ():
+            value, rule = data.get(name), f"a list or tuple of {kind.kind()}"
+            must(not isinstance(value, Component), f"{cls.called(data)}.{name}", rule, value)
+        return data
+
     @model_validator(mode="after")
     def _in_range(self) -> Self:
         """Raise InputError for magnitudes for which the arithmetic is invalid (see ranges.py)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -65,6 +65,11 @@ class ParticleShape(Component):
         shape is not a superquadric."""
         return None
 
+    @classmethod
+    def of(cls, shape: ParticleShape) -> Self | None:
+        """Return the shape of this class with the form of another shape; None if there is none."""
+        return shape if isinstance(shape, cls) else None
+
     def equal_volume_radius(self) -> float:
         """Return the radius (m) of the sphere of the same volume."""
         return float(np.cbrt(0.75 * self.volume() / np.pi))
@@ -92,6 +97,18 @@ class ParticleShape(Component):
             inside, outside = np.where(within, middle, inside), np.where(within, outside, middle)
         points: np.ndarray = inside[:, None] * ray
         return points
+
+
+def converted(kind: type[ParticleShape], where: str, shapes: Any) -> Any:
+    """Return a list of shapes as shapes of one class; other values, such as tables of a file, as they are.
+    InputError, naming ``where``, if a shape has no equal of this class."""
+    if not isinstance(shapes, list | tuple):
+        return shapes
+    rule = f"a {kind.kind()}, or a shape of the form of one"
+    of = [kind.of(one) if isinstance(one, ParticleShape) else one for one in shapes]
+    for k, (one, shape) in enumerate(zip(of, shapes, strict=True)):
+        must(one is not None, f"{where}[{k}]", rule, shape)
+    return tuple(of)
 
 
 def check_thickness(shape: ParticleShape) -> None:

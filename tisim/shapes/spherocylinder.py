@@ -31,6 +31,12 @@ class SpherocylinderShape(ParticleShape):
         check_thickness(self)
         return self
 
+    @classmethod
+    def of(cls, shape: ParticleShape) -> Self | None:
+        """Return the rod with the form of a shape, of length 0 for a sphere; None if there is none."""
+        rod = shape.rod()
+        return None if rod is None else cls(length=2 * rod[0], diameter=2 * rod[1])
+
     @property
     def radius(self) -> float:
         """Return the radius (m)."""

@@ -46,6 +46,12 @@ class SuperquadricShape(ParticleShape):
         check_thickness(self)
         return self
 
+    @classmethod
+    def of(cls, shape: ParticleShape) -> Self | None:
+        """Return the superquadric with the form of a shape, such as a sphere; None if there is none."""
+        known = shape.superquadric()
+        return None if known is None else cls(semi_axes=known[0], exponents=known[1])
+
     def volume(self) -> float:
         return self._integral(np.zeros(3))
 

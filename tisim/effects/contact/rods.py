@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
+from pydantic import field_validator
+
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Shaped
 from tisim.numerics.vectors import rotated
-from tisim.shapes.particle_shape import ParticleShape
+from tisim.shapes.particle_shape import ParticleShape, converted
 from tisim.shapes.rod_pairs import closest_rods, closest_spheres
 from tisim.shapes.spherocylinder import SpherocylinderShape
 
@@ -22,6 +24,11 @@ class Rods(Shaped):
     rods: tuple[SpherocylinderShape, ...] = option(
         "the shapes of the rods", examples=[(SpherocylinderShape(length=4e-3, diameter=1e-3),)], min_length=1
     )
+
+    @field_validator("rods", mode="before")
+    @classmethod
+    def _of_any_class(cls, shapes: Any) -> Any:
+        return converted(SpherocylinderShape, f"{cls.kind()}.rods", shapes)
 
     def shapes(self) -> Sequence[ParticleShape]:
         return self.rods

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
+from pydantic import field_validator
+
 from tisim.backend.taichi import ti
 from tisim.components.component import option
 from tisim.effects.base import Shaped
 from tisim.numerics.vectors import conjugate, rotated, turn_between
-from tisim.shapes.particle_shape import ParticleShape
+from tisim.shapes.particle_shape import ParticleShape, converted
 from tisim.shapes.superquadric import SuperquadricShape
 from tisim.shapes.superquadric_pairs import closest_superquadrics
 from tisim.shapes.superquadric_points import ELLIPSOIDS, ROD, SUPERQUADRICS, WITH_RODS, farthest_point
@@ -25,6 +27,11 @@ class Superquadrics(Shaped):
         examples=[(SuperquadricShape(semi_axes=(1e-3, 1e-3, 2e-3), exponents=(4.0, 4.0, 4.0)),)],
         min_length=1,
     )
+
+    @field_validator("superquadrics", mode="before")
+    @classmethod
+    def _of_any_class(cls, shapes: Any) -> Any:
+        return converted(SuperquadricShape, f"{cls.kind()}.superquadrics", shapes)
 
     def shapes(self) -> Sequence[ParticleShape]:
         return self.superquadrics
