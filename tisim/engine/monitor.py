@@ -173,7 +173,10 @@ class Monitor:
         return finite
 
     def status(self, w: int, now: Image) -> Status:
-        """Return whether and how a world has ended; ``now`` has ``status`` and ``ending_effect``."""
+        """Return whether and how a world has ended.
+
+        now : ``status``, ``ending_effect`` and the counters of all worlds.
+        """
         if w in self.faults:
             when, why = self.faults[w]
             return Status(
@@ -183,6 +186,9 @@ class Monitor:
         code, by = int(now["status"][w]), int(now["ending_effect"][w])
         if code == WorldStatus.ENDED and by < len(effects):
             return Status(True, f"{effects[by].ends}, by effects.{effects[by].label}")
+        for counter, why in self.simulation.scenes[w].stepper.ends.items():
+            if code == WorldStatus.ENDED and now[counter][w]:
+                return Status(True, why)
         return Status(code == WorldStatus.ENDED, REASONS[code])
 
     def _fault(self, w: int, then: Image, longest: float) -> str:

@@ -45,11 +45,13 @@ class Stepper(Component):
     follows_shear : whether it places moved particles with ``domain.put``, at the time of the new place, and
     reports displacements relative to ``drift``, so that it can step a sheared box. follows_constraints :
     whether it leaves particles held by constraints to the constraints. packs : whether it moves hard bodies.
+    ends : the counters that are not 0 if it has ended a world before its duration, each with the reason.
     """
 
     contract: ClassVar[bool] = True
     all_pairs: ClassVar[bool] = False
     world_fields: ClassVar[tuple[WorldField, ...]] = ()
+    ends: ClassVar[Mapping[str, str]] = {}
     random: ClassVar[bool] = False
     follows_shear: ClassVar[bool] = False
     follows_constraints: ClassVar[bool] = False

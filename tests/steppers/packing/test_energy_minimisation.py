@@ -195,6 +195,7 @@ def test_spheres_jam_at_random_close_packing():
     for result in run(made):
         assert result.status.ok
         assert result.work["jammed"] == 1
+    assert result.status.reason == "jammed: its bodies could not be brought closer"
         assert result.time < 1e6
         measures, density = result.measures, fraction(result, SPHERE)
         densities.append(density)
@@ -242,6 +243,7 @@ def test_a_run_that_ends_before_it_is_jammed_returns_its_last_accepted_configura
     assert result.time == 400.0
     assert result.measures["jammed_fraction"] == 0
     assert result.work["jammed"] == 0
+    assert result.status.reason == "reached its end"
     assert result.work["contractions"] > 1
     assert deepest(result.state, side, SPHERE, size) <= 1e-4 * RELATIVE
     assert result.measures["packing_fraction"] == pytest.approx(fraction(result, SPHERE), rel=1e-12)

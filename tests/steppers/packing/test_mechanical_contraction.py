@@ -202,6 +202,7 @@ def test_a_packing_has_no_overlaps_and_cannot_be_contracted(shape, method, attem
     result = run(made)
     assert result.status.ok
     assert result.work["jammed"] == 1
+    assert result.status.reason == "jammed: its bodies could not be brought closer"
     assert result.time < 1e6
     assert 0.45 < fraction(result, shape) < 0.72
     depth = deepest(result.state, made.domain.high[0], shape, result.state["radius"][0])
@@ -217,6 +218,7 @@ def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_ove
         assert deepest(result.state, made.domain.high[0], ROD, size) <= 1e-4 * (1 + 1e-9)
         assert result.work["contractions"] > 0
         assert result.work["jammed"] == 0
+    assert result.status.reason == "reached its end"
         assert result.measures["packing_fraction"] == pytest.approx(fraction(result, ROD), rel=1e-9)
 
 

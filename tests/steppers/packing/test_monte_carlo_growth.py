@@ -149,6 +149,7 @@ def test_spheres_pack_at_random_close_packing():
     result, side = run(made), made.domain.high[0]
     assert result.status.ok
     assert result.work["jammed"] == 1
+    assert result.status.reason == "jammed: its bodies could not be brought closer"
     assert result.time < 1e6
     assert result.measures["packing_fraction"] == pytest.approx(fraction(result, SPHERE), rel=1e-9)
     assert 0.61 < fraction(result, SPHERE) < 0.65

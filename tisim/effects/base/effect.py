@@ -148,8 +148,8 @@ class Effect(Component):
         default it can."""
 
     def approximations(self, extent: float) -> tuple[Any, ...]:
-        """Return cheaper laws for ``tisim cost`` to try in place of this one, the coarsest first, for
-        particles up to ``extent`` (m) apart; by default none."""
+        """Return other laws for ``tisim cost`` to try in place of this one, which trade accuracy for time,
+        the coarsest first, for particles up to ``extent`` (m) apart; by default none."""
         return ()
 
     def beside(self, other: Effect) -> Self:

@@ -109,8 +109,6 @@ class MagneticCylinders(Magnets):
         return super(MagneticCylinders, alike).structure()
 
     def approximations(self, extent: float) -> tuple[Effect, ...]:
-        if self.table_digits is not None or self.sum_digits is not None:
-            return ()
         short = any(one.length < one.radius for one in self.cylinders)
         by_table = () if short else (3, 4, 5)
         by_cells = (3, 4, 5) if len(self.cylinders) >= FEWEST_IN_CELLS else ()
@@ -118,7 +116,9 @@ class MagneticCylinders(Magnets):
         for digits in by_cells:
             ways += [(table, digits) for table in (digits, None) if table is None or by_table]
         ways.sort(key=lambda way: way[1] or way[0] or 0)
-        return tuple(self.with_digits(*way) for way in ways)
+        # Closed forms and a sum over all, the most accurate, are the last.
+        own, ways = (self.table_digits, self.sum_digits), [*ways, (None, None)]
+        return tuple(self.with_digits(*way) for way in ways if way != own)
 
     def with_digits(self, table: int | None, cells: int | None) -> Self:
         """Return a copy with other settings of accuracy."""
