@@ -7,10 +7,12 @@ import numpy as np
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.analysis import particle_balance
-from tisim.sources import PoreFlow
+from tisim.sources import MagneticCylinders, MagneticField, PoreFlow
 
 SIZE_CLASSES = 6
 """Classes of equal numbers of colloids by size, in each of which capture is taken as equal."""
+ANGLE_CLASSES = 3
+"""Classes of fibres by their angle to the field; random directions are in each with the same probability."""
 LAYER_CLASSES = 3
 """Classes of equal numbers of colloids by size in which layers capture. The colloids of a single run allow no
 more: their noise makes a power of the fraction that passes too large."""
@@ -46,6 +48,28 @@ def penetration(result: Result, which: np.ndarray | None = None) -> float:
     count = result.state.get("capture_count", result.state["captured_by"] >= 0)
     some = count[inside(result) if which is None else inside(result) & which]
     return float((some == 0).mean()) if len(some) else 1.0
+
+
+def captures_by_angle(result: Result, time: float = np.inf) -> np.ndarray:
+    """Return the number of colloids that a fibre has captured by a time (s), over its mean for all fibres, by
+    the angle between fibre and field, shape (ANGLE_CLASSES,).
+
+    The first class has the fibres across the field, up to |cos| = 1/ANGLE_CLASSES, and the last one those
+    along it. Images capture for their fibre. NaN for a class without fibres. The result must be of a field
+    that was never switched off.
+    """
+    magnets = next(one for one in result.scene.effects if isinstance(one, MagneticCylinders)).cylinders
+    field = next(one for one in result.scene.effects if isinstance(one, MagneticField)).constant
+    centre, axis = (np.array([getattr(one, name) for one in magnets]) for name in ("centre", "direction"))
+    cosine = np.abs(axis @ field) / np.linalg.norm(field)
+    kind = np.minimum((ANGLE_CLASSES * cosine).astype(int), ANGLE_CLASSES - 1)
+    low, high = matrix_box(result.scene)
+    fibres = np.bincount(kind[((low <= centre) & (centre <= high)).all(axis=1)], minlength=ANGLE_CLASSES)
+    by = result.state["captured_by"][captured_by(result, time)]
+    captures = np.bincount(kind[by], minlength=ANGLE_CLASSES)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        each: np.ndarray = captures / fibres * fibres.sum() / max(captures.sum(), 1)
+    return each
 
 
 def size_classes(radius: np.ndarray, number: int = SIZE_CLASSES) -> np.ndarray:

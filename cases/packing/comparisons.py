@@ -77,6 +77,7 @@ def compared(study: Study, rows: Sequence[PackedRow], free: Sequence[PackedRow] 
         "wedge": lambda some: of_wedges(some, free),
         "superballs": of_superballs,
         "effort": of_effort,
+        "wedge effort": of_wedge_effort,
     }
     return list(made[study](rows))
 
@@ -215,3 +216,15 @@ def of_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     for key, mean in fraction.items():
         subject = ", ".join(f"{name} {value:g}" for name, value in zip(columns, key, strict=True))
         yield Compared(subject, "", f"{text(mean)}, contacts {text(contacts[key])}")
+
+
+def of_wedge_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
+    columns = ("shape", "angle", "width", "number", "limit")
+    by = {name: means(rows, columns, name) for name in ("aligned", "fraction", "contacts")}
+    for key, aligned in by["aligned"].items():
+        aspect, angle, width, number, limit = key
+        length = width / shortest(aspect, angle)
+        subject = f"Lambda {aspect:g}, {angle:g} degrees, {length:.2g} l_min, {number} rods, {limit} attempts"
+        fraction, contacts = text(by["fraction"][key]), text(by["contacts"][key])
+        here = f"f_align {text(aligned)}, packing fraction {fraction}, contacts {contacts}"
+        yield Compared(subject, "f_align above 0.8", here)

@@ -28,6 +28,7 @@ Study = Literal[
     "superballs",
     "moment of inertia",
     "effort",
+    "wedge effort",
 ]
 STUDIES: tuple[Study, ...] = get_args(Study)
 ASPECTS = (1.0, 1.1, 1.25, 1.4, 1.5, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
@@ -50,6 +51,8 @@ ANGLES = (9.0, 45.0)
 """Angles of wedges, degrees."""
 WEDGE_LENGTHS = (1.2, 3.0)
 """Lengths l_w of wedges over the shortest one that holds a row of rods (B16 (2.12))."""
+LONG_WEDGE, MANY_ATTEMPTS = 6.0, 20_000
+"""Length of a wedge over the shortest one, and attempts, that show whether either changes the alignment."""
 CONFINED_START = 0.03
 """Packing fraction of a start in a cylinder or a wedge, much of which bodies cannot reach."""
 EXPONENTS = (2.0, 2.5, 3.0, 4.0, 5.0)
@@ -165,7 +168,7 @@ def container_of(one: PackedPlan | PackedRow) -> containers.Container | None:
     """Return the container of a packing; None for a periodic box."""
     if one.study == "cylinder":
         return CylindricalContainer(diameter=one.width)
-    if one.study == "wedge":
+    if one.study in ("wedge", "wedge effort"):
         return WedgeContainer(length=one.width, angle=np.radians(one.angle))
     return None
 
@@ -199,6 +202,12 @@ def plans(study: Study) -> list[PackedPlan]:
             for angle in ANGLES
             for factor in WEDGE_LENGTHS
         ]
+    if study == "wedge effort":
+        # Rods are less aligned there than in B16.
+        aspect, angle = WEDGE_ASPECTS[-1], ANGLES[-1]
+        length = shortest(aspect, angle)
+        one = PackedPlan(study, aspect, width=WEDGE_LENGTHS[-1] * length, angle=angle)
+        return [one, replace(one, limit=MANY_ATTEMPTS), replace(one, width=LONG_WEDGE * length)]
     if study == "moment of inertia":
         return [
             PackedPlan(study, one, inertia=xi, limit=1000, halvings=2)

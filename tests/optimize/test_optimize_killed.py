@@ -12,14 +12,16 @@ from tisim.files import output_folder
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import verify
 
-QUICK = ("drift",)
-REAL = ("agglomeration", "--size", "small")
+QUICK = ("drift", "--generations", "5")
+REAL = ("agglomeration", "--size", "small", "--generations", "5")
+FILTER = ("packed_filter", "--size", "small", "--generations", "1")
 
 
 def begin(case, folder):
     """Start the search in a process that prints the key of each stored evaluation."""
-    settings = ("--generations", "5", "--seed", "3", "--out", folder)
-    return worker("tisim", "optimize", *case, *settings, stderr=subprocess.DEVNULL, pipesize=PIPE)
+    return worker(
+        "tisim", "optimize", *case, "--seed", "3", "--out", folder, stderr=subprocess.DEVNULL, pipesize=PIPE
+    )
 
 
 def kill(search, folder, rng):
@@ -60,7 +62,7 @@ def contents_of(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), (REAL, 20)])
+@pytest.mark.parametrize(("case", "kills"), [(QUICK, 3), (REAL, 20), (FILTER, 3)])
 def test_a_killed_search_ends_as_if_undisturbed(tmp_path, case, kills):
     with begin(case, tmp_path / "whole") as search:
         search.communicate()

@@ -1,11 +1,19 @@
-"""The figure of directions of rods."""
+"""The figures of directions of rods, and of neighbours and pores."""
 
 import numpy as np
 import pytest
 
 from tisim import InputError
-from tisim.analysis import direction_histogram
-from tisim.plotting.packings import directions
+from tisim.analysis import (
+    PackedBodies,
+    direction_histogram,
+    pore_diffusion,
+    pore_image,
+    pore_sizes,
+    surface_correlation,
+)
+from tisim.plotting.packings import directions, structure
+from tisim.shapes import SphereShape, SpherocylinderShape
 
 
 def test_directions_are_drawn_with_one_scale(rng):
@@ -28,3 +36,36 @@ def test_directions_are_drawn_with_one_scale(rng):
 def test_nothing_to_draw_is_refused():
     with pytest.raises(InputError, match="histograms must be at least one; received 0"):
         directions({})
+
+
+def test_neighbours_and_pores_of_two_packings_are_drawn_side_by_side(rng):
+    """Spheres and rods at random places in a small box, which may overlap."""
+    shapes = {"spheres": SphereShape(diameter=2.0), "rods": SpherocylinderShape(length=2.0, diameter=2.0)}
+    made = {
+        name: PackedBodies.of(shape, rng.uniform(0, 12, (40, 3)), low=(0, 0, 0), high=(12, 12, 12))
+        for name, shape in shapes.items()
+    }
+    figure = structure(made, spacing=0.25, reach=1.0)
+    near, pores, paths = figure.axes
+    for one, drawn, line, points in zip(made.values(), near.patches, pores.lines, paths.lines, strict=False):
+        values, edges, _ = drawn.get_data()
+        np.testing.assert_allclose(values, surface_correlation(one, 2.0 * edges))
+        assert edges[-1] == 1.0
+        diameter, part = line.get_data()
+        sizes = pore_sizes(one, 0.5)
+        np.testing.assert_allclose(diameter, sizes.diameter / 2.0)
+        assert part[-1] == pytest.approx(1.0)
+        assert diameter[np.searchsorted(part, 0.5)] == pytest.approx(sizes.quantile(0.5) / 2.0)
+        image = pore_image(one, 0.5)
+        along = [pore_diffusion(image, axis) for axis in range(3)]
+        np.testing.assert_allclose(points.get_xdata(), image.mean())
+        np.testing.assert_allclose(points.get_ydata(), [each.tortuosity for each in along])
+    assert [text.get_text() for text in pores.get_legend().texts] == ["spheres", "rods"]
+    x, y = paths.lines[-1].get_data()
+    np.testing.assert_allclose(y * y * x, 1.0)
+    for given, message in (
+        ({}, "packings must be at least one"),
+        (made, "reach must be above 0; received 0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            structure(given, reach=0.0)

@@ -1,4 +1,4 @@
-"""Figures of packings: the directions of rods."""
+"""Figures of packings: the directions of rods, and the neighbours and pores of bodies."""
 
 from __future__ import annotations
 
@@ -7,9 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.analysis.packings.pores import pore_image, pore_sizes
+from tisim.analysis.packings.surface_correlation import surface_correlation
+from tisim.analysis.packings.tortuosity import pore_diffusion
 from tisim.analysis.packings.wall_alignment import DirectionHistogram
 from tisim.errors import must
-from tisim.plotting.style import empty, letters
+from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
+
+GAP_BINS = 20
+"""Intervals of the gap in the pair correlation of surfaces."""
 
 
 def directions(histograms: Mapping[str, DirectionHistogram]) -> Figure:
@@ -31,5 +38,51 @@ def directions(histograms: Mapping[str, DirectionHistogram]) -> Figure:
         axis.set(xlabel="azimuth (degrees)", title=title)
     panels[0].set_ylabel("cosine of the polar angle")
     figure.colorbar(mesh, ax=panels.tolist(), label="density of directions (1: random)")
+    letters(panels)
+    return figure
+
+
+def structure(packings: Mapping[str, PackedBodies], spacing: float = 0.1, reach: float = 1.5) -> Figure:
+    """Draw neighbours and pores of packings: the pair correlation of surfaces by gap, the part of the pore
+    volume in pores up to a diameter, and the tortuosity factor along each axis by porosity, with Bruggeman's
+    law for spheres, eps^(-1/2).
+
+    packings : by title, periodic along all axes. spacing : side of a voxel, and reach : largest gap, both in
+        D, the shortest side of the box around the first body. A packing of 200 bodies takes some seconds.
+
+    Source: D. A. G. Bruggeman, Ann. Phys. 416 (1935) 636, for the law.
+    """
+    must(len(packings) > 0, "packings", "at least one", len(packings))
+    must(reach > 0, "reach", "above 0", reach)
+    figure = empty(12.6, 3.9)
+    near, pores, paths = panels = figure.subplots(1, 3)
+    porosity = []
+    for (title, one), colour in zip(packings.items(), AXIS_COLOURS * len(packings), strict=False):
+        unit = float(one.diameters()[0])
+        edges = np.linspace(0.0, reach, GAP_BINS + 1)
+        near.stairs(surface_correlation(one, unit * edges), edges, baseline=None, color=colour, lw=1.4)
+        sizes = pore_sizes(one, spacing * unit)
+        pores.step(
+            sizes.diameter / unit, np.cumsum(sizes.share), where="post", color=colour, lw=1.4, label=title
+        )
+        image = pore_image(one, spacing * unit)
+        along = [pore_diffusion(image, axis) for axis in range(3)]
+        porosity += [each.porosity for each in along]
+        paths.plot(porosity[-3:], [each.tortuosity for each in along], "o", ms=5, color=colour, alpha=0.7)
+    near.axhline(1.0, color="0.6", lw=0.9, ls="--")
+    near.set(xlabel="gap between surfaces over D", ylabel="pair correlation of surfaces")
+    near.set_xlim(0, reach)
+    near.set_ylim(bottom=0)
+    pores.set(
+        xlabel="pore diameter over D", ylabel="part of the pore volume in pores up to it", ylim=(0, 1.02)
+    )
+    pores.set_xlim(left=0)
+    pores.legend(frameon=False, fontsize=8)
+    law = np.linspace(0.97 * min(porosity), 1.03 * max(porosity), 50)
+    paths.plot(law, law**-0.5, color="0.6", lw=0.9, ls="--", label=r"$\epsilon^{-1/2}$")
+    paths.set(xlabel=r"porosity $\epsilon$", ylabel="tortuosity factor")
+    paths.legend(frameon=False, fontsize=8)
+    for axis in panels:
+        plain(axis)
     letters(panels)
     return figure

@@ -121,6 +121,20 @@ def test_cylinders_beside_b16():
     assert of_cylinders(rows, FREE).axes[3].lines[0].get_xdata()[-1] == 0
 
 
+def test_efforts_in_a_wedge_are_compared_by_attempts_and_by_length():
+    few, many, long = plans("wedge effort")
+    assert (few.limit, many.limit, long.width) == (None, 20_000, pytest.approx(2 * few.width))
+    rows = [
+        row("wedge effort", 3.0, seed, width=one.width, angle=45.0, limit=one.limit or 2000, aligned=aligned)
+        for one, aligned in ((few, 0.7), (many, 0.8), (long, 0.75))
+        for seed in (0, 1)
+    ]
+    found = {one.subject: one.here for one in compared("wedge effort", rows)}
+    lines = ("3 l_min, 200 rods, 2000", "3 l_min, 200 rods, 20000", "6 l_min, 200 rods, 2000")
+    assert list(found) == [f"Lambda 3, 45 degrees, {one} attempts" for one in lines]
+    assert [one.split()[1] for one in found.values()] == ["0.7", "0.8", "0.75"]
+
+
 def test_wedges_beside_b16():
     """phi* is 0 for one row of rods and 1 at the periodic value."""
     least = shortest_fraction(3.0, 9.0)
