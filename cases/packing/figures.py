@@ -14,6 +14,7 @@ from tisim.cases.packing.snapshots import Packing
 from tisim.cases.packing.studies import PackedRow, Study, measured_packings, plans, table
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
+from tisim.plotting.packings import structure
 from tisim.plotting.style import empty, letters, plain
 
 STARTS = {"small": 2, "default": 3, "paper": 3}
@@ -43,8 +44,8 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """rods.png, inertia.png, cylinder.png, wedge.png, superballs.png: densities, contacts and order; pictures
-    of packings in cylinders.png, wedges.png and superball_packings.png; wedge_directions.png; and
-    packings.csv with all packings of a size."""
+    of packings in cylinders.png, wedges.png and superball_packings.png; wedge_directions.png; structure.png
+    with neighbours and pores; and packings.csv with all packings of a size."""
     made: dict[Study, list[Packing]] = {}
     for k, study in enumerate(DRAWN):
         part = progress_of_part(progress, k, len(DRAWN))
@@ -82,7 +83,25 @@ def drawn(made: Mapping[Study, list[Packing]]) -> dict[str, Figure]:
         "wedge_directions.png": ("wedge", snapshots.wedge_directions),
         "superball_packings.png": ("superballs", snapshots.of_superballs),
     }
+    shown = compared_bodies(made)
     return {
+        **({"structure.png": structure(shown)} if shown else {}),
         **{name: draw(rows[study]) for name, (study, draw) in curves_of.items() if study in rows},
         **{name: draw(made[study]) for name, (study, draw) in bodies_of.items() if study in made},
     }
+
+
+def compared_bodies(made: Mapping[Study, list[Packing]]) -> dict[str, PackedBodies]:
+    """Return spheres, rods and superballs whose neighbours and pores are compared, by title; none unless
+    there are all."""
+    wanted: tuple[tuple[Study, float, str], ...] = (
+        ("aspect ratio", 1.0, "spheres"),
+        ("aspect ratio", 3.0, "rods, L/D = 2"),
+        ("superballs", 4.0, "superballs, exponent 4"),
+    )
+    found = {
+        title: next((bodies for row, bodies in made.get(study, []) if row.shape == shape), None)
+        for study, shape, title in wanted
+    }
+    some = {title: bodies for title, bodies in found.items() if bodies is not None}
+    return some if len(some) == len(wanted) else {}

@@ -7,7 +7,7 @@ from tisim import InputError
 from tisim.analysis import (
     PackedBodies,
     direction_histogram,
-    pore_diffusion,
+    packing_diffusion,
     pore_image,
     pore_sizes,
     surface_correlation,
@@ -56,9 +56,8 @@ def test_neighbours_and_pores_of_two_packings_are_drawn_side_by_side(rng):
         np.testing.assert_allclose(diameter, sizes.diameter / 2.0)
         assert part[-1] == pytest.approx(1.0)
         assert diameter[np.searchsorted(part, 0.5)] == pytest.approx(sizes.quantile(0.5) / 2.0)
-        image = pore_image(one, 0.5)
-        along = [pore_diffusion(image, axis) for axis in range(3)]
-        np.testing.assert_allclose(points.get_xdata(), image.mean())
+        along = [packing_diffusion(one, 0.5, axis) for axis in range(3)]
+        np.testing.assert_allclose(points.get_xdata(), pore_image(one, 0.5).mean())
         np.testing.assert_allclose(points.get_ydata(), [each.tortuosity for each in along])
     assert [text.get_text() for text in pores.get_legend().texts] == ["spheres", "rods"]
     x, y = paths.lines[-1].get_data()

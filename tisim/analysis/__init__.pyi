@@ -87,6 +87,7 @@ from .packings.shape_integrals import surface_area as surface_area
 from .packings.shape_integrals import surface_areas as surface_areas
 from .packings.surface_correlation import surface_correlation as surface_correlation
 from .packings.tortuosity import PoreDiffusion as PoreDiffusion
+from .packings.tortuosity import packing_diffusion as packing_diffusion
 from .packings.tortuosity import pore_diffusion as pore_diffusion
 from .packings.wall_alignment import DirectionHistogram as DirectionHistogram
 from .packings.wall_alignment import WallAlignment as WallAlignment

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tisim.analysis.packings.packed_bodies import PackedBodies
-from tisim.analysis.packings.pores import pore_image, pore_sizes
+from tisim.analysis.packings.pores import pore_sizes
 from tisim.analysis.packings.surface_correlation import surface_correlation
-from tisim.analysis.packings.tortuosity import pore_diffusion
+from tisim.analysis.packings.tortuosity import packing_diffusion
 from tisim.analysis.packings.wall_alignment import DirectionHistogram
 from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
@@ -65,8 +65,7 @@ def structure(packings: Mapping[str, PackedBodies], spacing: float = 0.1, reach:
         pores.step(
             sizes.diameter / unit, np.cumsum(sizes.share), where="post", color=colour, lw=1.4, label=title
         )
-        image = pore_image(one, spacing * unit)
-        along = [pore_diffusion(image, axis) for axis in range(3)]
+        along = [packing_diffusion(one, spacing * unit, axis) for axis in range(3)]
         porosity += [each.porosity for each in along]
         paths.plot(porosity[-3:], [each.tortuosity for each in along], "o", ms=5, color=colour, alpha=0.7)
     near.axhline(1.0, color="0.6", lw=0.9, ls="--")

@@ -7,13 +7,14 @@ from tests.analysis.packings.lattices import FRACTION, lattice
 from tisim import InputError
 from tisim.analysis import (
     PackedBodies,
+    packing_diffusion,
     permeability,
     pore_diffusion,
     pore_image,
     pore_sizes,
     specific_surface,
 )
-from tisim.shapes import SphereShape, SpherocylinderShape
+from tisim.shapes import SphereShape, SpherocylinderShape, SuperquadricShape
 
 ROD = SpherocylinderShape(length=4.0, diameter=1.0)
 
@@ -90,6 +91,26 @@ def test_spheres_of_a_cubic_lattice_obstruct_as_rayleigh_found():
     errors = [pore_diffusion(pore_image(packing, 1 / n)).relative - expected for n in (16, 32, 48)]
     assert np.abs(errors[2]) < 0.012
     assert np.abs(errors[2]) < np.abs(errors[0])
+
+
+def test_the_limit_of_small_voxels_is_closer_to_rayleigh():
+    """27 spheres of the lattice, each at another place among the voxels, 11 of which are across a sphere. No
+    pores lead through the gaps of touching cubes."""
+    phi = 0.3
+    diameter = (6 * phi / np.pi) ** (1 / 3)
+    places = np.stack(np.meshgrid(*3 * [np.arange(3) + 0.5], indexing="ij"), -1).reshape(-1, 3)
+    packing = PackedBodies.of(SphereShape(diameter=diameter), places, (0, 0, 0), (3, 3, 3))
+    expected = 1 - 3 * phi / (2 + phi - 0.98 * phi ** (10 / 3))
+    spacing = 3 / 40
+    found = packing_diffusion(packing, spacing, 0)
+    assert found.relative == pytest.approx(expected, rel=0.02)
+    assert found.tortuosity == pytest.approx(found.porosity / found.relative)
+    assert found.porosity == pytest.approx(1 - phi, abs=0.005)
+    assert pore_diffusion(pore_image(packing, spacing), 0).relative < 0.96 * expected
+    cube = SuperquadricShape(semi_axes=(0.5, 0.5, 0.5), exponents=(20.0, 20.0, 20.0))
+    closed = PackedBodies.of(cube, places, (0, 0, 0), (3, 3, 3))
+    assert packing_diffusion(closed, 0.1).relative == 0
+    assert np.isinf(packing_diffusion(closed, 0.1).tortuosity)
 
 
 def test_cylinders_across_the_flux_obstruct_as_rayleigh_found():

@@ -7,6 +7,7 @@ from tisim.analysis import Mean
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.cases.packing.comparisons import compared, scaled, shortest_fraction
 from tisim.cases.packing.curves import of_cylinders, of_rods, of_superballs, of_wedges
+from tisim.cases.packing.figures import compared_bodies
 from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.scene import rod
 from tisim.cases.packing.snapshots import in_cylinders, in_wedges, wedge_directions
@@ -206,6 +207,17 @@ def test_contacts_of_a_row_of_spheres():
     places = [(float(k), 0.5, 0.5) for k in range(4)]
     bodies = PackedBodies.of(SphereShape(diameter=1.0), places, (0, 0, 0), (9, 9, 9))
     assert contact_counts(bodies).tolist() == [1, 2, 2, 1]
+
+
+def test_neighbours_of_spheres_rods_and_superballs_are_compared_if_all_are_there():
+    balls = [(row("superballs", shape), f"exponent {shape:g}") for shape in (2.0, 4.0)]
+    rods = [(row("aspect ratio", shape, seed), (shape, seed)) for shape in (1.0, 2.0, 3.0) for seed in (0, 1)]
+    assert compared_bodies({"aspect ratio": rods, "superballs": balls}) == {
+        "spheres": (1.0, 0),
+        "rods, L/D = 2": (3.0, 0),
+        "superballs, exponent 4": "exponent 4",
+    }
+    assert compared_bodies({"aspect ratio": rods}) == {}
 
 
 @pytest.mark.slow

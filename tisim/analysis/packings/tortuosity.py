@@ -8,6 +8,8 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
+from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.analysis.packings.pores import pore_image
 from tisim.domains.domain import Axes
 from tisim.errors import RunError, must
 from tisim.packing.region import ALL_AXES
@@ -49,8 +51,8 @@ def pore_diffusion(image: np.ndarray, axis: int = 2, periodic: Axes = ALL_AXES) 
     Laplace's equation is solved with a flux of 0 into bodies, by finite volumes, one per voxel. Along a
     periodic axis the mean gradient is given and the concentration is otherwise periodic; if ``axis`` is open,
     the concentrations at both of its faces are given. No flux passes other open faces. The steps of voxels at
-    inclined surfaces lower D_eff, for spheres of 20 voxels across at a packing fraction of 0.3 by 4 %. The
-    error falls as the side of a voxel, and two images give the limit.
+    inclined surfaces lower D_eff, for spheres of 20 voxels across by 4 % at a packing fraction of 0.3 and by
+    6 % at 0.48. The error falls as the side of a voxel; ``packing_diffusion`` gives the limit.
 
     Source: S. J. Cooper, A. Bertei, P. R. Shearing, J. A. Kilner, N. P. Brandon, SoftwareX 5 (2016) 203; N.
     Epstein, Chem. Eng. Sci. 44 (1989) 777, for both names.
@@ -82,6 +84,20 @@ def pore_diffusion(image: np.ndarray, axis: int = 2, periodic: Axes = ALL_AXES) 
     # What is left of fluxes that cancel in closed pores is rounding.
     relative = float(flux) if flux > 100 * RESIDUAL * porosity else 0.0
     return PoreDiffusion(porosity, relative, porosity / relative if relative else float("inf"))
+
+
+def packing_diffusion(packing: PackedBodies, spacing: float, axis: int = 2) -> PoreDiffusion:
+    """Return the diffusion along an axis through the pores of a packing, in the limit of small voxels.
+
+    ``relative`` is extrapolated linearly from images with voxels of a side ``spacing`` (m) and of twice this
+    side; see ``pore_diffusion``. For some hundred spheres of 10 voxels across it is right to about 1 %, for a
+    single one in a periodic box only to some percent, because it depends on its place among the voxels. It is
+    0 if no pores of the image with the smaller voxels lead through.
+    """
+    fine, coarse = (pore_diffusion(pore_image(packing, side), axis, packing.periodic)
+                    for side in (spacing, 2 * spacing))  # fmt: skip
+    relative = max(2 * fine.relative - coarse.relative, 0.0) if fine.relative else 0.0
+    return PoreDiffusion(fine.porosity, relative, fine.porosity / relative if relative else float("inf"))
 
 
 def _links(number: np.ndarray, axis: int, joined: bool) -> tuple[np.ndarray, np.ndarray]:
