@@ -127,6 +127,7 @@ def of_fibres(filter: PackedFilter, results: Sequence[Result], starts: int) -> I
     others: tuple[tuple[str, dict[str, Any]], ...] = (
         ("in a uniform flow", {"flow": "uniform"}),
         ("without mutual magnetisation", {"mutual": False}),
+        ("of saturated fibres", {"saturated": True}),
         ("with steps of 0.05 D", {"longest_move": 0.05}),
         ("with steps of 0.01 D", {"longest_move": 0.01}),
     )

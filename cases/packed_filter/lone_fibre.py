@@ -98,7 +98,9 @@ def lone_fibres(
     scenes = []
     for k, axis in enumerate(axes):
         body = Cylinder(axis=tuple(axis.tolist()), radius=matrix.diameter / 2, length=matrix.length)
-        scenes.append(coarse.scene_about((body,), (magnetised(body, filter.field()),), box, seed + k))
+        scenes.append(
+            coarse.scene_about((body,), (magnetised(body, filter.field(), filter.saturated),), box, seed + k)
+        )
     results = sound(run(scenes, progress))
     radius, at = (np.array([result.state[name] for result in results]) for name in ("radius", "captured_at"))
     return LoneFibre(filter, np.full(fibres, size), radius, at)

@@ -37,8 +37,8 @@ from tisim.packing import GrainClass, LognormalSizes, MagneticCore
 from tisim.packing.grains import draw
 from tisim.packing.magnetic_core import core_normals
 from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow, UniformFlow, magnetise
+from tisim.sources.magnetic import soft_magnet, stoner_wohlfarth
 from tisim.sources.magnetic.cell_sum import Corners
-from tisim.sources.magnetic.soft_magnet import magnetisation
 from tisim.sources.switched import NO_END
 from tisim.steppers import Brownian, DriftLimit
 
@@ -98,20 +98,23 @@ class PackedFilter:
     """A filter and the suspension in it.
 
     matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
-    magnetise each other. digits : of the sum of their fields by cells; None to add the fibres one by one,
-    from a table, which is faster for few colloids. speed : superficial velocity of the water, the volume flow
-    over the cross section of the column, m/s. flow : "resolved" between the fibres, or "uniform" with the
-    mean velocity in the pores. resolution : cells of the resolved flow over D, unless ``cells`` along x, y
-    and z are given. feed : time until which colloids enter, s. field_end : time at which the field is
-    switched off, s. adhering : fraction of captured colloids that are never released; None for captures that
-    last for ever. mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids.
-    duration : of the run, s. longest_move : largest displacement of a colloid in a step, D.
+    magnetise each other. saturated : whether the fibres are saturated in any field, in the direction of least
+    energy (Stoner and Wohlfarth), as in B16 chapter 6; otherwise they are soft steel. digits : of the sum of
+    their fields by cells; None to add the fibres one by one, from a table, which is faster for few colloids.
+    speed : superficial velocity of the water, the volume flow over the cross section of the column, m/s. flow
+    : "resolved" between the fibres, or "uniform" with the mean velocity in the pores. resolution : cells of
+    the resolved flow over D, unless ``cells`` along x, y and z are given. feed : time until which colloids
+    enter, s. field_end : time at which the field is switched off, s. adhering : fraction of captured colloids
+    that are never released; None for captures that last for ever. mean_radius, polydispersity : of the
+    colloids, m, and relative. number : of colloids. duration : of the run, s. longest_move : largest
+    displacement of a colloid in a step, D.
     """
 
     matrix: Matrix = field(default_factory=Matrix)
     mode: Mode = "static"
     flux: float = 1.0
     mutual: bool = True
+    saturated: bool = False
     digits: int | None = FIELD_DIGITS
     speed: float = 1e-4
     flow: Flow = "resolved"
@@ -159,7 +162,7 @@ class PackedFilter:
 
     def magnets(self) -> tuple[Cylinder, ...]:
         """Return the magnetised fibres of the matrix, followed by their images."""
-        return _magnets(self.matrix, self.field(), self.mode == "static", self.mutual)
+        return _magnets(self.matrix, self.field(), self.mode == "static", self.mutual, self.saturated)
 
     def box(self) -> Box:
         """Return the box of the matrix."""
@@ -297,20 +300,21 @@ def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int, tube:
 
 
 @lru_cache(KEPT_MATRICES)
-def _magnets(matrix: Matrix, flux: Vector, bulk: bool, mutual: bool) -> tuple[Cylinder, ...]:
+def _magnets(matrix: Matrix, flux: Vector, bulk: bool, mutual: bool, saturated: bool) -> tuple[Cylinder, ...]:
     fibres = matrix.fibres()
     every = matrix.with_images(fibres, IMAGE_REACH * matrix.length, bulk)
     if mutual:
-        own = magnetise(every, flux, STEEL_SATURATION, math.inf)[: len(fibres)]
+        own = magnetise(every, flux, STEEL_SATURATION, None if saturated else math.inf)[: len(fibres)]
     else:
-        own = tuple(magnetised(one, flux) for one in fibres)
+        own = tuple(magnetised(one, flux, saturated) for one in fibres)
     # The outermost images lack neighbours; all images are magnetised as their fibres.
     return matrix.with_images(own, IMAGE_REACH * matrix.length, bulk)
 
 
-def magnetised(body: Cylinder, flux: Vector) -> Cylinder:
-    """Return a fibre of soft steel in a field (T)."""
-    m = magnetisation(body.axis, body.radius, body.length, STEEL_SATURATION, flux)
+def magnetised(body: Cylinder, flux: Vector, saturated: bool) -> Cylinder:
+    """Return a fibre of steel, which is soft or always saturated, alone in a field (T)."""
+    law = stoner_wohlfarth.magnetisation if saturated else soft_magnet.magnetisation
+    m = law(body.axis, body.radius, body.length, STEEL_SATURATION, flux)
     return body.model_copy(update={"magnetisation": m})
 
 

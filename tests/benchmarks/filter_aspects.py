@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +65,7 @@ def main() -> None:
     options = parser.parse_args()
     print(processor()["model name"])
     edges = np.degrees(np.arccos(np.arange(ANGLE_CLASSES + 1) / ANGLE_CLASSES))
-    angles = [f"{flat:.0f} to {steep:.0f} degrees" for steep, flat in zip(edges, edges[1:], strict=False)]
+    angles = [f"{flat:.0f} to {steep:.0f} degrees" for steep, flat in pairwise(edges)]
     print(" | ".join(["| L/D", "fibres", *(f"{wait:g} s" for wait in WAITS), *angles]) + " |")
     for aspect in options.aspects:
         print(f"| {static_line(aspect, options.packings)} |", flush=True)

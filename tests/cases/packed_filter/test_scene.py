@@ -61,12 +61,29 @@ def test_neighbours_change_the_magnetisation_and_images_have_that_of_their_fibre
     number = filter.matrix.number
     every = np.array([one.magnetisation for one in filter.magnets()])
     alone = np.array([one.magnetisation for one in replace(filter, mutual=False).magnets()])
-    expected = [magnetised(one, filter.field()).magnetisation for one in filter.matrix.fibres()]
+    expected = [magnetised(one, filter.field(), False).magnetisation for one in filter.matrix.fibres()]
     np.testing.assert_allclose(alone[:number], expected)
     change = np.linalg.norm(every - alone, axis=1)[:number] / 2.2e6
     assert 0.02 < change.mean() < 0.3
     known = {tuple(one) for one in every[:number]}
     assert {tuple(one) for one in every[number:]} <= known
+
+
+def test_saturated_fibres_are_stronger_than_soft_ones_across_the_field(filter):
+    """At 1 T, below N mu_0 M_s across, soft fibres across the field are not saturated; those along it are."""
+    alone = replace(filter, mutual=False)
+    cosine, soft = np.array(
+        [(abs(one.direction[0]), np.linalg.norm(one.magnetisation)) for one in alone.magnets()]
+    ).T
+    hard = replace(alone, saturated=True).magnets()
+    np.testing.assert_allclose([np.linalg.norm(one.magnetisation) for one in hard], 2.2e6)
+    assert (soft[cosine < 0.2] < 0.95 * 2.2e6).all()
+    assert (soft[cosine > 0.6] > 0.99 * 2.2e6).all()
+    assert min(one.magnetisation[0] for one in hard) > 0
+    both = replace(alone, saturated=True, mutual=True).magnets()
+    np.testing.assert_allclose([np.linalg.norm(one.magnetisation) for one in both], 2.2e6)
+    change = [np.subtract(a.magnetisation, b.magnetisation) for a, b in zip(hard, both, strict=True)]
+    assert 0.02 < np.linalg.norm(change, axis=1).mean() / 2.2e6 < 0.3
 
 
 @pytest.mark.slow
