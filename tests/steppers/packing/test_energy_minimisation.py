@@ -195,7 +195,7 @@ def test_spheres_jam_at_random_close_packing():
     for result in run(made):
         assert result.status.ok
         assert result.work["jammed"] == 1
-    assert result.status.reason == "jammed: its bodies could not be brought closer"
+        assert result.status.reason == "jammed: its bodies could not be brought closer"
         assert result.time < 1e6
         measures, density = result.measures, fraction(result, SPHERE)
         densities.append(density)

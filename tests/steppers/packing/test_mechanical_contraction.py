@@ -218,7 +218,7 @@ def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_ove
         assert deepest(result.state, made.domain.high[0], ROD, size) <= 1e-4 * (1 + 1e-9)
         assert result.work["contractions"] > 0
         assert result.work["jammed"] == 0
-    assert result.status.reason == "reached its end"
+        assert result.status.reason == "reached its end"
         assert result.measures["packing_fraction"] == pytest.approx(fraction(result, ROD), rel=1e-9)
 
 
