@@ -22,7 +22,7 @@ from tisim.optimize.analysis.likelihood import Likelihood
 from tisim.optimize.analysis.response import Response
 from tisim.optimize.report.analysis import Analysis
 
-SETS, RUNS = 40, 60
+SETS, RUNS = 24, 60
 """Data sets of the quick tests, and runs of each; the slow tests have 200 sets of 150 runs."""
 
 
