@@ -88,11 +88,14 @@ def is_refusal(answer, must, what):
     return bool(code)
 
 
-@pytest.fixture
-def compiled_once(monkeypatch):
-    """All runs of this process share one simulation."""
-    simulations = []
+@pytest.fixture(scope="module")
+def simulations():
+    """The simulation that all runs of this process share, once there is one."""
+    return []
 
+
+@pytest.fixture
+def compiled_once(monkeypatch, simulations):
     def simulation(scene):
         simulations[:] = simulations or [Simulation(scene)]
         return simulations[0]
