@@ -153,7 +153,7 @@ def test_cost(tisim, tmp_path, monkeypatch):
     "command",
     [
         ("plot", "FILE"),
-        ("movie", "FILE"),
+        pytest.param(("movie", "FILE"), marks=pytest.mark.slow),
         ("export", "FILE", "--format", "xyz"),
         pytest.param(("export", "FILE", "--format", "vtk"), marks=pytest.mark.slow),
         pytest.param(("export", "FILE", "--format", "h5md"), marks=pytest.mark.slow),

@@ -138,6 +138,7 @@ def errors_in_this_runtime():
     return [float(np.abs(contact.gap - gap).max()), float(turned.max())]
 
 
+@pytest.mark.slow
 def test_errors_in_single_precision_are_those_of_its_input(single):
     gap, turned = single("shapes.test_mixed_pairs", "errors_in_this_runtime")
     assert gap < 1e-5
