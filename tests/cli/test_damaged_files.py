@@ -88,11 +88,14 @@ def is_refusal(answer, must, what):
     return bool(code)
 
 
-@pytest.fixture
-def compiled_once(monkeypatch):
-    """All runs of this process share one simulation."""
-    simulations = []
+@pytest.fixture(scope="module")
+def simulations():
+    """The simulation that all runs of this process share, once there is one."""
+    return []
 
+
+@pytest.fixture
+def compiled_once(monkeypatch, simulations):
     def simulation(scene):
         simulations[:] = simulations or [Simulation(scene)]
         return simulations[0]
@@ -150,7 +153,7 @@ def test_cost(tisim, tmp_path, monkeypatch):
     "command",
     [
         ("plot", "FILE"),
-        ("movie", "FILE"),
+        pytest.param(("movie", "FILE"), marks=pytest.mark.slow),
         ("export", "FILE", "--format", "xyz"),
         pytest.param(("export", "FILE", "--format", "vtk"), marks=pytest.mark.slow),
         pytest.param(("export", "FILE", "--format", "h5md"), marks=pytest.mark.slow),

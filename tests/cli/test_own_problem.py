@@ -5,10 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.optimize.shared_case import skip_pictures
 from tests.own_files import LAW, PROBLEM
 from tisim.optimize.storage.cache import Cache
 
 SEARCH = ["optimize", "my_drift.py", "--out", "s"]
+
+
+@pytest.fixture(autouse=True)
+def without_pictures(monkeypatch):
+    skip_pictures(monkeypatch.setattr)
 
 
 def runs(path="s/search.h5"):

@@ -15,6 +15,8 @@ SLOW = (
     *("column_at_rest", "friction_at_its_limit", "impacts_from_nanometres_to_kilometres"),
     *("far_from_the_origin", "colloids_of_nanometres", "electrons_from_a_nanometre"),
     *("zero_field_to_saturation", "time_of_a_million_steps"),
+    *("fibres_that_touch_and_overlap", "absolute_zero_to_a_billion_kelvin"),
+    *("random_driven_charges", "random_damped_grains", "closed_inlet"),
     *("one_body", "coincident_bodies", "jammed_start", "sizes_one_to_ten", "near_cubes", "needles"),
 )
 """Cases that compile large structures, or several, or whose laws other quick tests compile."""

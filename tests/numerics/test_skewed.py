@@ -19,7 +19,7 @@ KINDS_OF_NOISE = {
 }
 
 
-@pytest.mark.parametrize("starts", [12, 16, 24])
+@pytest.mark.parametrize("starts", [12, pytest.param(16, marks=pytest.mark.slow), 24])
 @pytest.mark.parametrize("noise", KINDS_OF_NOISE)
 def test_coverage(noise, starts):
     """The coverage may be higher for rare and discrete values; it is slightly lower for lognormal ones

@@ -11,7 +11,7 @@ from scipy import stats
 from tests.scenes import by_id, compiled, simulate
 from tests.steppers.brownian.colloids import DIFFUSIVITY, RADIUS, TEMPERATURE, VISCOSITY, Shear
 from tests.throwaway import SoftShellOfAll
-from tisim import InputError, MeasureSeries, Particles, Scene, Simulation
+from tisim import InputError, MeasureSeries, Particles, Scene
 from tisim.analysis import particle_balance
 from tisim.effects import Gravity
 from tisim.engine.checkpoint import restore, save
@@ -206,12 +206,11 @@ def full(seed=0, **more):
 @pytest.mark.long
 def test_numbers_balance_at_every_look():
     setup = full()
-    simulation = Simulation(setup)
+    simulation = compiled(setup, 4, 512)
     simulation.load([setup])
     series = MeasureSeries(7.3 * DT)
     simulation.run(observers=[series])
     (result,) = simulation.results()
-    simulation.close()
     look = series[0]
     inside = look["captured_particles"] + look["free_particles"]
     np.testing.assert_array_equal(look["entered"] - look["exited"], inside)

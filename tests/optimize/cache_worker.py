@@ -97,8 +97,9 @@ def search(path):
 
 def shared(folder, method, *seed_and_more):
     """A search of shared_case that prints the key of each evaluation when it is stored."""
-    from tests.optimize.shared_case import searched
+    from tests.optimize.shared_case import searched, skip_pictures
 
+    skip_pictures(setattr)
     announce()
     seed, *warm = seed_and_more
     searched(folder, method, int(seed), warm_start=bool(warm))

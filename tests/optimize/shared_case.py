@@ -5,6 +5,8 @@ import numpy as np
 from tisim import optimize
 from tisim.optimize.problem.genes import Gene
 from tisim.optimize.problem.problem import Problem
+from tisim.optimize.report import report
+from tisim.optimize.report.analysis import Analysis
 
 
 def noisy(design, seed):
@@ -15,6 +17,15 @@ def noisy(design, seed):
 
 def problem(high=1.0, **fields):
     return Problem.of_function(noisy, [Gene("x", "m", 0, high), Gene("y", "m", 0, 1)], **fields)
+
+
+def skip_pictures(replace):
+    """Skip sensitivities and pictures, which take most of the time of such searches.
+
+    replace : a function such as setattr.
+    """
+    replace(report, "picture", lambda path, draw: [])
+    replace(Analysis, "of", lambda outcome: Analysis(None, ()))
 
 
 def searched(folder, method, seed, **settings):

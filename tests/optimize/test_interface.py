@@ -11,6 +11,7 @@ import pytest
 
 from tests.optimize.drift_case import distance, problem
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
+from tests.optimize.shared_case import skip_pictures
 from tisim import InputError, optimize
 from tisim.backend import runtime
 
@@ -66,8 +67,9 @@ def test_pandas_is_optional(drift, monkeypatch):
 
 
 @pytest.mark.long
-def test_a_search_in_a_folder_can_be_continued(drift, tmp_path, capsys):
+def test_a_search_in_a_folder_can_be_continued(drift, tmp_path, capsys, monkeypatch):
     """A search without a folder has the same designs; a repetition runs and prints nothing."""
+    skip_pictures(monkeypatch.setattr)
     first = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
     again = optimize.run(problem("default", ""), out=tmp_path / "s", seed=4, **SMALL)
     assert first.designs == again.designs == drift.designs

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 from tests.optimize.cache_files import PIPE, worker
-from tests.optimize.shared_case import problem, searched
+from tests.optimize.shared_case import problem, searched, skip_pictures
 from tisim import InputError, optimize
 from tisim.optimize.problem.constraint import DesignConstraint
-from tisim.optimize.report import report
-from tisim.optimize.report.analysis import Analysis
 from tisim.optimize.storage.cache import Cache, existing
 from tisim.optimize.storage.maintenance import verify
 
@@ -22,10 +20,10 @@ METHODS = ("zohdi", "cma-es", "random", "restart")
 
 
 @pytest.fixture(autouse=True)
-def without_pictures(monkeypatch):
-    """Skip sensitivities and pictures, which take most of the time of such searches."""
-    monkeypatch.setattr(report, "picture", lambda path, draw: [])
-    monkeypatch.setattr(Analysis, "of", lambda outcome: Analysis(None, ()))
+def quick(monkeypatch):
+    """Skip pictures, and fsync, as no file of these tests outlives them."""
+    skip_pictures(monkeypatch.setattr)
+    monkeypatch.setattr("os.fsync", lambda file: None)
 
 
 def tables_of(folder, name):
@@ -67,8 +65,8 @@ def test_a_search_reuses_the_runs_of_others(tmp_path):
     assert again.hits >= 2
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("methods", [METHODS[:2], pytest.param(METHODS, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("methods", [METHODS[:2], METHODS])
 def test_several_processes_with_different_methods(tmp_path, methods):
     folder = tmp_path / "both"
     at_work = [worker("shared", folder, method, 1, stderr=subprocess.PIPE) for method in methods]
@@ -109,13 +107,14 @@ def test_a_resumed_warm_start_uses_its_original_data(tmp_path):
     """Neither its own runs nor later runs of others are part of its warm start."""
     searched(tmp_path, "zohdi", 1)
     warm = searched(tmp_path, "gaussian-process", 2, warm_start=True)
-    assert searched(tmp_path, "gaussian-process", 2).name != warm.name
+    assert searched(tmp_path, "gaussian-process", 2, generations=0).name != warm.name
     searched(tmp_path, "random", 5)
     again = searched(tmp_path, "gaussian-process", 2, warm_start=True)
     assert (again.name, again.evaluations, again.designs) == (warm.name, 0, warm.designs)
     more = searched(tmp_path, "gaussian-process", 2, warm_start=True, generations=4)
     assert (more.name, list(more.logbook)[:4]) == (warm.name, list(warm.logbook))
-    assert searched(tmp_path, "gaussian-process", 3, warm_start=True).name != warm.name
+    other = searched(tmp_path, "gaussian-process", 3, warm_start=True, generations=0)
+    assert other.name != warm.name
 
 
 def test_a_warm_start_learns_only_from_designs_in_its_range(tmp_path):

@@ -86,12 +86,12 @@ def test_the_wheel_carries_the_static_files():
 
 
 def test_particles_are_left_out_if_two_frames_are_too_many(record, rng, tmp_path):
-    path = record(scene(60_000), noise(rng, 60_000, 2))
+    path = record(scene(20_000), noise(rng, 20_000, 2))
     written = write(path, tmp_path / "r.html", options=ReportOptions(limit=0.6))
     data, text = facts_of(written)
     assert written.stat().st_size <= 0.6e6
     part = int(re.search(r"Only particles whose id is a multiple of (\d+) are shown", text)[1])
-    assert data["trajectory"]["particles"] == len(range(0, 60_000, part))
+    assert data["trajectory"]["particles"] == len(range(0, 20_000, part))
 
 
 def test_a_limit_that_is_no_size_is_refused():

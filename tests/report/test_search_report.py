@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.cli.conftest import tisim  # noqa: F401
+from tests.optimize.shared_case import skip_pictures
 from tests.report.searches import GENES, HOSTILE, HOSTILE_CHOICE, HOSTILE_NAME, made_up, problem, searched
 from tests.report.test_run_report import facts_of
 from tisim import InputError, Scene, optimize, run
@@ -314,7 +315,9 @@ def test_the_command_of_a_search_is_kept(tisim, own_file):  # noqa: F811
 
 
 @pytest.mark.long
-def test_the_best_designs_of_a_case_are_run_for_their_clouds(tisim, tmp_path):  # noqa: F811
+def test_the_best_designs_of_a_case_are_run_for_their_clouds(tisim, tmp_path, monkeypatch):  # noqa: F811
+    # The page of a search does not show them.
+    skip_pictures(monkeypatch.setattr)
     words = ("agglomeration", "--size", "small", "--generations", 0, "--population", 3, "--out", "s")
     assert tisim("optimize", *words, "--set", "search.ensemble.confirm=2")[0] == 0
     assert tisim("report", "s", "--designs", 2)[0] == 0

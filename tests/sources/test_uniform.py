@@ -82,7 +82,11 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("law", LAWS)
+SLOW = ("mutual, one sweep a step", "mutual, plain sweeps")
+"""Other ways to the mutual moments of an equal field."""
+
+
+@pytest.mark.parametrize("law", [pytest.param(law, marks=[pytest.mark.slow] * (law in SLOW)) for law in LAWS])
 def test_moments_vanish_after_the_end(law):
     """Until then they are those of a field without an end. Without a field each sweep of mutual moments
     reduces them by the same factor: their change, relative to what is left of them, never becomes small."""
@@ -113,6 +117,7 @@ def test_moments_vanish_after_the_end(law):
     assert np.abs(force).max() <= 1e-20 * np.abs(pulled).max()
 
 
+@pytest.mark.slow
 def test_a_charge_flies_straight_before_and_after_a_pulse():
     """A magnetic field between two times turns the velocity by w (end - begin), w = q B/m, on a circle of
     radius v/w; an electric field then adds q E/m times the time for which it acts. Outside of the pulses the

@@ -49,7 +49,7 @@ def test_the_area_of_a_superquadric_by_projections(rng):
     """Cauchy: the surface is four times the mean projected area, of polygons of support points."""
     shape = SuperquadricShape(semi_axes=(1.0, 0.6, 0.4), exponents=(3.0, 5.0, 10.0))
     angle, areas = np.arange(720) * 2 * np.pi / 720, []
-    for turn in Rotation.random(4000, rng=rng):
+    for turn in Rotation.random(2000, rng=rng):
         x, y = turn.as_matrix()[:2]
         outline = shape.support(np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
         a, b = outline @ x, outline @ y

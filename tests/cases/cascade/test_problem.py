@@ -44,6 +44,18 @@ def test_the_capture_time_is_the_one_of_the_cascade():
     assert found != capture_time(across(40.0), seed=4)
 
 
+def test_a_design_that_captures_too_little_is_refused(monkeypatch):
+    """Stages that never capture most particles, without a run."""
+    asked = []
+    monkeypatch.setattr(
+        cascades, "captured_at", lambda some, **more: asked.append((some, more)) or [np.full((1, 25), np.inf)]
+    )
+    with pytest.raises(InputError, match=r"time to capture 90% must be at most 4400 s; received more"):
+        capture_time(DESIGN, seed=5)
+    assert asked == [([planned(DESIGN)], {"repeats": 1, "seed": 5, "longest": GIVEN_UP})]
+
+
+@pytest.mark.slow
 def test_fibres_along_the_field_capture_too_little(monkeypatch):
     monkeypatch.setattr(cascades, "GIVEN_UP", 100.0)
     with pytest.raises(InputError, match=r"time to capture 90% must be at most 100 s; received more"):

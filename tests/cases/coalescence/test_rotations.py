@@ -69,7 +69,10 @@ def test_elongations_and_spins_of_each_start():
     )
 
 
-def test_the_text_and_the_picture_of_clouds():
+def test_the_text_and_the_picture_of_clouds(monkeypatch):
+    # The drawing of a cloud takes seconds, and is tested with that of the asteroids of test_runs.py.
+    drawn = []
+    monkeypatch.setattr(rotations, "close_up", lambda axis, *given: drawn.append(axis))
     text = report(FOUND).splitlines()
     assert sum("bounding" in one for one in text) == 1
     assert text[1].startswith("  34.9 µrad/s (L21: 500), 0 A/m: 1.0")
@@ -81,6 +84,7 @@ def test_the_text_and_the_picture_of_clouds():
     assert sum("119 minus 0 A/m" in one and "L21: -0.11" in one for one in text) == 1
     axes = picture(FOUND).axes
     assert len(axes) == 9 + 1
+    assert drawn == axes[:-1]
     labels = [one.get_text() for one in axes[-1].get_legend().get_texts()]
     assert len(labels) == 6
 

@@ -19,6 +19,7 @@ def test_sizes_of_a_mixture():
     assert (size[large] ** 3).sum() / 1000 == pytest.approx(0.7, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_mixture_is_denser_than_equal_spheres():
     scenes = [
         of_shape(rod(1.0), "small", 1, number=120, attempts=100, method="original", sizes=sizes)

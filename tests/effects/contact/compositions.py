@@ -231,11 +231,13 @@ def along(name, overlap, moved=0.0, turned=0.0, **first):
     The contact faces x, with R* = 1 m and m* = 1 kg; ``moved`` is the tangential displacement of its surfaces
     since the point before (m), and ``turned`` the rotation of the other grain since then (rad).
     """
-    simulation = loaded([grains(name, [[0, 0, 0]], [[0, 0, 0]], first=first)])
-    (bound,) = simulation.assembly.effects.of(Granular)
+    made = grains(name, [[0, 0, 0]], [[0, 0, 0]], first=first)
     steps = [np.broadcast_to(one, (len(overlap), 3)) / DT for one in (moved, turned)]
     path, out = np.column_stack([overlap, *steps]), np.zeros((len(overlap), 7))
-    _along(bound, path, out)
+    # Of the law alone: a simulation would take much longer to compile.
+    with started(made) as (allocation, _):
+        (bound,) = allocation.effects.of(Granular)
+        _along(bound, path, out)
     return out[:, :3], out[:, 3:6], out[:, 6]
 
 

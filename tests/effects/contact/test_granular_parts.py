@@ -235,7 +235,6 @@ def jkr_force(overlap):
     return closed_forms.jkr_force(overlap, GAMMA, 1.0, E_STAR)
 
 
-@pytest.mark.slow
 def test_jkr_force_from_contact_to_pull_off():
     """-8/9 of that at the first touch and -5/9 at the end of the contact; no force before the first touch."""
     ways = np.concatenate([[-0.1 * STRETCH, 0.0, 0.03], np.linspace(0.03, -0.999999 * STRETCH, 300)])
@@ -256,6 +255,7 @@ def test_friction_of_adhesive_grains_includes_pull_off():
     assert force[0, 1] == pytest.approx(0.3 * 10 / 9 * PARTS, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_parting_takes_the_work_of_adhesion():
     """7.09 (W^5 R*^4 / E*^2)^(1/3), W = 2 gamma, for pairs with sufficient speed; slower ones stay
     together."""

@@ -59,7 +59,7 @@ def along(normal, overlap, moved, **law):
 @pytest.mark.long
 def test_steps_equal_the_reference(rng):
     """Unlike grains that overlap, spin and slide, in a cell; many stick, many slide."""
-    made = [heap(rng, friction=0.1 + 0.2 * k, restitution=0.3 + 0.2 * k) for k in range(4)]
+    made = [heap(rng, friction=0.1 + 0.2 * k, restitution=0.3 + 0.2 * k) for k in (0, 3)]
     for steps in (1, 300):
         for one, result in zip(made, run(made, steps=steps), strict=True):
             known, state = reference(one), by_id(result)

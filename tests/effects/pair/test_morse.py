@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-import tisim
-from tests.effects.contact.loads import balanced, close, fields_beside_the_core, loads, pairs
+from tests.effects.contact.loads import WORLDS, balanced, close, fields_beside_the_core, loads, pairs
 from tests.effects.pair.test_mie import crowd
-from tests.scenes import scene
+from tests.scenes import scene, simulate
 from tisim import InputError, Scene
 from tisim.effects import Morse
 from tisim.testing import assert_contracts
@@ -96,14 +95,11 @@ def test_a_bound_pair_oscillates_with_the_frequency_of_the_well():
     depth, alpha, mass = 1e-3, 500.0, 2e-6
     period = 2 * np.pi / (alpha * np.sqrt(2 * depth / (mass / 2)))
     apart = 2e-3 + 1e-6
-    pair = tisim.Scene(
-        particles=tisim.Particles(
-            position=[[0, 0, 0], [apart, 0, 0]], velocity=[[0, 0, 0]] * 2, radius=1e-3, mass=mass
-        ),
-        effects=(Morse(depth=depth, alpha=alpha, cutoff=3.0),),
-        duration=period / 2,
-    )
-    result = tisim.run(pair).check()
+    pair = scene([[0, 0, 0], [apart, 0, 0]], np.zeros((2, 3)), (Morse(depth=depth, alpha=alpha, cutoff=3.0),),
+                 radius=1e-3, mass=mass, dt=period / 2000, steps=1000)  # fmt: skip
+    # In the simulation whose initial forces the tests above read.
+    (result,) = simulate([pair], worlds=WORLDS, capacity=16)
+    result.check()
     gap = result.state["position"][1, 0] - result.state["position"][0, 0] - 2e-3
     assert gap == pytest.approx(-1e-6, rel=5e-3)
 

@@ -22,7 +22,7 @@ from tisim.optimize.analysis.likelihood import Likelihood
 from tisim.optimize.analysis.response import Response
 from tisim.optimize.report.analysis import Analysis
 
-SETS, RUNS = 40, 60
+SETS, RUNS = 24, 60
 """Data sets of the quick tests, and runs of each; the slow tests have 200 sets of 150 runs."""
 
 
@@ -79,7 +79,7 @@ def test_designs_that_crowd_around_the_best_do_not_narrow_intervals(sets, close)
 
 def test_a_crowd_alone_does_not_determine_the_genes():
     """Designs within 0.004 of each other do not tell how heap and rate depend on the genes."""
-    inside, width = coverage(20, crowded, spread=0, width=0.004)
+    inside, width = coverage(12, crowded, spread=0, width=0.004)
     assert inside.min() > 0.8
     assert width[1] > 2.5
     assert all(1.1 < one < 2.0 for one in width[[0, 2]])

@@ -99,7 +99,9 @@ def test_budget_is_spent_and_not_exceeded(name):
     assert 97 < outcome.evaluations <= 100
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in ("random", "restart"))) for n in METHODS]
+)
 @pytest.mark.parametrize("after", [pytest.param(1, marks=pytest.mark.slow), 140])
 def test_a_resumed_search_is_the_same(path, name, after):
     settings = {

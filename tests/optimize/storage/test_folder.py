@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from tests.optimize.fake_runs import FakeEvaluator, fake_problem
+from tests.optimize.shared_case import skip_pictures
 from tisim import InputError
 from tisim.cases import case as catalogue
 from tisim.cases.case import Case, Size
@@ -28,7 +29,15 @@ SEARCH = ["optimize", "bowl", "--out", "s", "--generations", "1"]
 
 
 @pytest.fixture
-def optimize(tmp_path, monkeypatch, capsys):
+def unanalysed():
+    """Skip sensitivities and pictures; a test that needs them undoes this."""
+    with pytest.MonkeyPatch.context() as patch:
+        skip_pictures(patch.setattr)
+        yield patch
+
+
+@pytest.fixture
+def optimize(tmp_path, monkeypatch, capsys, unanalysed):
     """Runs a search in a fresh folder with further arguments: (exit code, standard error)."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(catalogue, "every", lambda: {BOWL.name: BOWL})
@@ -114,7 +123,8 @@ def test_searches_of_one_problem_share_their_runs(optimize, tmp_path):
         assert len(cache) > runs
 
 
-def test_results_are_of_the_search_that_ended_last(optimize, tmp_path):
+def test_results_are_of_the_search_that_ended_last(optimize, tmp_path, unanalysed):
+    unanalysed.undo()
     folder = tmp_path / "s"
 
     def shown():
@@ -229,7 +239,8 @@ def test_user_files_are_not_replaced_by_default(optimize, tmp_path, name):
     assert contents(users.parent) == {name: b"the user's own"}
 
 
-def test_user_files_are_replaced_on_request(optimize, tmp_path):
+def test_user_files_are_replaced_on_request(optimize, tmp_path, unanalysed):
+    unanalysed.undo()
     (tmp_path / "s").mkdir()
     for name in OF_USERS:
         (tmp_path / "s" / name).write_text("the user's own")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tisim import InputError
-from tisim.sources import Cylinder, MagneticCylinders, MagneticSpheres, Sphere, sample
+from tisim.sources import Cylinder, FieldSampler, MagneticCylinders, MagneticSpheres, Sphere, sample
 
 FLUX = "magnetic_flux_density"
 BEFORE_AND_AFTER = ((0.0, 0.0), (0.4999, 0.0), (0.5, 1.0), (0.7499, 1.0), (0.75, 0.0), (9.0, 0.0))
@@ -29,11 +29,10 @@ def test_magnets_act_between_their_begin_and_their_end(magnets):
     points = [[1.5e-3, 2e-4, 3e-4], [1e-4, 2e-4, 3e-4]]
     always = sample((magnets(),), FLUX, points)
     assert np.linalg.norm(always[0], axis=1).min() > 1e-3
-    for t, share in BEFORE_AND_AFTER:
-        for value, whole in zip(
-            sample((magnets(begin=0.5, end=0.75),), FLUX, points, t), always, strict=True
-        ):
-            np.testing.assert_array_equal(value, share * whole)
+    with FieldSampler((magnets(begin=0.5, end=0.75),), FLUX) as switched:
+        for t, share in BEFORE_AND_AFTER:
+            for value, whole in zip(switched(points, t), always, strict=True):
+                np.testing.assert_array_equal(value, share * whole)
 
 
 @BOTH

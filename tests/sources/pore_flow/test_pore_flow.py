@@ -54,6 +54,14 @@ def close():
     return 1e-9 if runtime.current().precision == "f64" else 3e-5
 
 
+@pytest.fixture(scope="module")
+def usual():
+    """Samples the usual flow; compiled once."""
+    source = flow()
+    with FieldSampler([source], source.quantity) as field:
+        yield field
+
+
 def splines(found, points):
     """Velocities at points from those on faces, by basis splines of scipy: of degree 2 along a component and
     1 across it."""
@@ -93,21 +101,21 @@ def reference(points, h=1e-9):
     return np.where(part < 1, part * (v - across) + part**2 * across, v)
 
 
-def test_velocity_between_faces_is_that_of_basis_splines_and_vanishes_at_surfaces(rng):
+def test_velocity_between_faces_is_that_of_basis_splines_and_vanishes_at_surfaces(rng, usual):
     points = np.array(LOW) + SIDES * rng.uniform(-1.5, 2.5, (500, 3))
     layer = (depth(points) > 0) & (depth(points) < 1)
     assert layer.sum() > 50
     assert (depth(points) < 0).sum() > 30
-    velocity, _ = sample((flow(),), "flow_velocity", points)
+    velocity, _ = usual(points)
     np.testing.assert_allclose(velocity, reference(points), atol=max(30 * close(), 1e-6) * 2e-3)
     assert (velocity[depth(points) < -1e-3] == 0).all()
-    images, _ = sample((flow(),), "flow_velocity", points + SIDES * [3, -2, 1])
+    images, _ = usual(points + SIDES * [3, -2, 1])
     np.testing.assert_allclose(images, velocity, atol=100 * close() * 2e-3)
 
 
-def test_the_gradient_is_the_derivative_and_has_no_trace_beyond_the_layer(rng):
+def test_the_gradient_is_the_derivative_and_has_no_trace_beyond_the_layer(rng, usual):
     points = np.array(LOW) + SIDES * rng.uniform(-1, 2, (500, 3))
-    _, gradient = sample((flow(),), "flow_velocity", points)
+    _, gradient = usual(points)
     scale, h = abs(gradient).max(), 1e-5 * MM
     trace = abs(np.trace(gradient, axis1=1, axis2=2))
     beyond = depth(points) > 1.01
@@ -126,10 +134,10 @@ def test_the_gradient_is_the_derivative_and_has_no_trace_beyond_the_layer(rng):
     assert np.sqrt((wrong[inside] ** 2).mean()) < 0.15 * scale
 
 
-def test_the_mean_over_the_box_is_the_superficial_velocity():
+def test_the_mean_over_the_box_is_the_superficial_velocity(usual):
     places = [np.array(LOW)[b] + SIDES[b] * (np.arange(n) + 0.37) / n for b, n in enumerate((16, 12, 16))]
     points = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, 3)
-    velocity, _ = sample((flow(),), "flow_velocity", points)
+    velocity, _ = usual(points)
     mean = solved().mean_velocity
     # Splines keep it; the layer at surfaces, 1.3 cells of a fibre 5.6 cells thick, takes a little away.
     np.testing.assert_allclose(velocity.mean(axis=0), mean / mean[2] * 2e-3, atol=0.03 * 2e-3)
@@ -199,13 +207,13 @@ def test_worlds_of_a_batch_have_their_own_matrices(rng):
     assert (velocity[0] != velocity[2]).any()
 
 
-def test_outside_of_a_free_filter_the_velocity_is_uniform(rng):
+def test_outside_of_a_free_filter_the_velocity_is_uniform(rng, usual):
     source = flow(outside="uniform")
     mean = solved().mean_velocity
     points = np.array(LOW) + SIDES * rng.uniform(-2, 3, (300, 3))
     inside = ((points >= LOW) & (points <= HIGH)).all(axis=1)
     velocity, gradient = sample((source,), "flow_velocity", points)
-    within, _ = sample((flow(),), "flow_velocity", points)
+    within, _ = usual(points)
     np.testing.assert_array_equal(velocity[inside], within[inside])
     expected = np.broadcast_to(mean / mean[2] * 2e-3, velocity[~inside].shape)
     np.testing.assert_allclose(velocity[~inside], expected, rtol=10 * close(), atol=1e-12)
@@ -254,10 +262,10 @@ def test_the_speed_at_a_surface_falls_with_the_spacing(rng):
         assert values[2] < 0.4 * values[1]
 
 
-def test_bounds_hold():
+def test_bounds_hold(usual):
     source = flow()
     points = np.array(LOW) + SIDES * np.random.default_rng(3).uniform(size=(2000, 3))
-    velocity, gradient = sample((source,), "flow_velocity", points)
+    velocity, gradient = usual(points)
     assert np.linalg.norm(velocity, axis=1).max() <= source.strongest() < 10 * 2e-3 * 3
     assert source.shortest_length() == pytest.approx(min(SIDES / (16, 12, 16)))
     assert flow(cells=(16, 12, 1), spheres=()).shortest_length() == pytest.approx(min(SIDES[:2] / (16, 12)))

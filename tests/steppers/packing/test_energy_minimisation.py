@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.scenes import compiled, simulate
 from tests.shapes.pairs import Bodies, superquadric_contacts
 from tests.steppers.packing.bits import same_bits
 from tests.steppers.packing.test_mechanical_contraction import (
+    CAPACITY,
     CUBOID,
     ELLIPSOID,
     ROD,
@@ -16,12 +18,14 @@ from tests.steppers.packing.test_mechanical_contraction import (
     hard,
     rod_contact,
 )
-from tisim import Box, InputError, Particles, Scene, Simulation, run
+from tisim import Box, InputError, Particles, Scene, run
 from tisim.effects import Gravity
 from tisim.steppers import EnergyMinimisation
 
 pytestmark = pytest.mark.long
 
+WORLDS = 3
+"""The same in quick tests, so that they share a compiled simulation."""
 RELATIVE = 1 + 1e-9
 """Overlaps are recomputed in NumPy."""
 
@@ -154,7 +158,7 @@ def axes_of(turns, shape):
 )
 def test_steps_equal_their_reference_and_the_energy_falls(shape, number):
     made = scene(shape, number, 0.5, spread=0.1)
-    side, simulation = made.domain.high[0], Simulation(made, 1)
+    side, simulation = made.domain.high[0], compiled(made, worlds=WORLDS, capacity=CAPACITY)
     simulation.load([made])
     reference = Reference({name: np.array(simulation.state[name]) for name in simulation.state}, side, shape)
     energies = []
@@ -169,7 +173,6 @@ def test_steps_equal_their_reference_and_the_energy_falls(shape, number):
         np.testing.assert_allclose(*axes, rtol=0, atol=1e-9)
     assert len(energies) < 100
     assert energies[-1] < 0.2 * energies[0]
-    simulation.close()
 
 
 def test_forces_and_torques_of_the_reference_are_derivatives_of_its_energy(rng):
@@ -237,7 +240,7 @@ def test_superquadrics_jam_at_a_higher_density_than_spheres(shape):
 
 
 def test_a_run_that_ends_before_it_is_jammed_returns_its_last_accepted_configuration():
-    result = run(scene(SPHERE, 100, duration=400.0))
+    (result,) = simulate([scene(SPHERE, 100, duration=400.0)], worlds=WORLDS, capacity=CAPACITY)
     size, side = result.state["radius"][0], result.scene.domain.high[0]
     assert result.status.ok
     assert result.time == 400.0
@@ -255,7 +258,8 @@ def test_a_world_ends_at_its_target():
     made = [
         scene(SPHERE, 100, packed, target=target) for packed, target in ((0.2, 0.4), (0.2, 0.45), (0.3, 0.25))
     ]
-    for result, target in zip(run(made), (0.4, 0.45, 0.3), strict=True):
+    results = simulate(made, worlds=WORLDS, capacity=CAPACITY)
+    for result, target in zip(results, (0.4, 0.45, 0.3), strict=True):
         density, size = result.measures["packing_fraction"], result.state["radius"][0]
         assert result.status.ok
         assert density == pytest.approx(target, rel=1e-6)

@@ -5,9 +5,10 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
+from tests.scenes import compiled, simulate
 from tests.shapes.pairs import Bodies, RodsOfPairs, superquadric_contacts
 from tests.steppers.packing.bits import resumed, same_bits
-from tisim import Box, InputError, Particles, Scene, Simulation, run
+from tisim import Box, InputError, Particles, Scene, run
 from tisim.effects import Gravity
 from tisim.effects.contact.hard_rods import HardRods
 from tisim.effects.contact.hard_superquadrics import HardSuperquadrics
@@ -20,6 +21,8 @@ ROD, SPHERE = SpherocylinderShape(length=1.5, diameter=1.0), SpherocylinderShape
 ELLIPSOID = SuperquadricShape(semi_axes=(0.5, 0.8, 1.2), exponents=(2.0, 2.0, 2.0))
 CUBOID = SuperquadricShape(semi_axes=(0.8, 0.5, 1.0), exponents=(5.0, 3.0, 4.0))
 METHODS = ("revised", "original")
+CAPACITY, ATTEMPTS = 100, 400
+"""The same in most tests, so that those of one structure share a compiled simulation."""
 
 
 def hard(shape):
@@ -149,8 +152,8 @@ def attempt(
 )
 def test_an_attempt_equals_its_reference(shape, method):
     """Until the first contraction, from deep overlaps on."""
-    made = scene(shape, 100, 0.08, method=method)
-    side, simulation = made.domain.high[0], Simulation(made, 1)
+    made = scene(shape, 100, 0.08, method=method, attempts=ATTEMPTS)
+    side, simulation = made.domain.high[0], compiled(made, capacity=CAPACITY)
     simulation.load([made])
     moved = 0.0
     for _ in range(4):
@@ -165,7 +168,6 @@ def test_an_attempt_equals_its_reference(shape, method):
         np.testing.assert_allclose(found[:, :, turned], orientations[:, :, turned], rtol=0, atol=1e-10)
         moved = max(moved, np.abs(after["position"] - before["position"]).max())
     assert moved > 0.01
-    simulation.close()
 
 
 def deepest(state, side, shape, size, periodic=(True, True, True)):
@@ -189,9 +191,9 @@ def fraction(result, shape):
 @pytest.mark.parametrize(
     ("shape", "method", "attempts"),
     [
-        (SPHERE, "revised", 400),
-        (SPHERE, "original", 400),
-        pytest.param(ROD, "original", 400, marks=pytest.mark.slow),
+        (SPHERE, "revised", ATTEMPTS),
+        (SPHERE, "original", ATTEMPTS),
+        pytest.param(ROD, "original", ATTEMPTS, marks=pytest.mark.slow),
         pytest.param(ELLIPSOID, "revised", 50, marks=pytest.mark.slow),
     ],
 )
@@ -199,7 +201,7 @@ def test_a_packing_has_no_overlaps_and_cannot_be_contracted(shape, method, attem
     # Longer motions than B16's 0.1 need fewer attempts, and pack a little less densely.
     options = {"method": method, "attempts": attempts, "volume_step": 2.0, "motion": 0.5}
     made = scene(shape, 100, 0.2, duration=1e6, **options)
-    result = run(made)
+    (result,) = simulate([made], capacity=CAPACITY)
     assert result.status.ok
     assert result.work["jammed"] == 1
     assert result.status.reason == "jammed: its bodies could not be brought closer"
@@ -250,10 +252,11 @@ def test_other_effects_and_domains_are_refused():
 
 def test_a_box_must_be_wide_enough_for_its_bodies():
     """At the start, and while they grow."""
+    given = {"method": "original", "attempts": ATTEMPTS}
     with pytest.raises(InputError, match="box must be at least 10 m wide where it is periodic"):
-        run(scene(SpherocylinderShape(length=4.0, diameter=1.0), 9))
-    made = scene(ROD, 30, duration=1e5, method="original", volume_step=2.0)
-    result = run(made)
+        simulate([scene(SpherocylinderShape(length=4.0, diameter=1.0), 9, **given)], capacity=CAPACITY)
+    made = scene(ROD, 30, duration=1e5, volume_step=2.0, **given)
+    (result,) = simulate([made], capacity=CAPACITY)
     assert "bodies longer than half the periodic box; take more bodies" in result.status.reason
     assert 4 * result.state["radius"][0] == pytest.approx(made.domain.high[0], rel=1e-2)
 
