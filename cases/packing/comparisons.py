@@ -212,10 +212,14 @@ def of_superballs(rows: Sequence[PackedRow]) -> Iterator[Compared]:
 
 def of_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     columns = ("shape", "number", "limit", "step", "tolerance")
-    fraction, contacts = (means(rows, columns, name) for name in ("fraction", "contacts"))
+    fraction, contacts, touching = (
+        means(rows, ("method", *columns), name) for name in ("fraction", "contacts", "touching")
+    )
     for key, mean in fraction.items():
-        subject = ", ".join(f"{name} {value:g}" for name, value in zip(columns, key, strict=True))
-        yield Compared(subject, "", f"{text(mean)}, contacts {text(contacts[key])}")
+        method, *numbers = key
+        subject = ", ".join(f"{name} {value:g}" for name, value in zip(columns, numbers, strict=True))
+        both = f"contacts {text(contacts[key])} extrapolated, {text(touching[key])} up to 1e-4 D"
+        yield Compared(f"{method}, {subject}", "", f"{text(mean)}, {both}")
 
 
 def of_wedge_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
