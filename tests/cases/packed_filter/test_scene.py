@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tisim import run
+from tisim import Simulation, run
+from tisim.analysis import particle_balance
 from tisim.cases.packed_filter.measures import captured_fraction, missing, penetration, released_fraction
 from tisim.cases.packed_filter.scene import (
     MEAN_RADIUS,
@@ -27,8 +28,20 @@ def filter():
 
 
 @pytest.fixture(scope="module")
-def result(filter):
-    return run(filter.scene(3))
+def looks(filter):
+    """Results of a run at eight times; the field ends at the fourth."""
+    scene = filter.scene(3)
+    simulation, seen = Simulation(scene), []
+    simulation.load(scene)
+    for time in np.linspace(0.0, filter.duration, 9)[1:]:
+        simulation.run(until=time)
+        seen += simulation.results()
+    return seen
+
+
+@pytest.fixture(scope="module")
+def result(looks):
+    return looks[-1]
 
 
 def test_colloids_start_in_the_pores(filter):
@@ -112,6 +125,22 @@ def test_no_colloid_is_lost_and_most_are_released(result):
     held = result.work["captures"] - result.work["releases"]
     assert captured_fraction(result) == pytest.approx(held / 60)
     assert result.state["captured_at"].max() <= 80.5
+
+
+@pytest.mark.slow
+def test_colloids_balance_at_every_look(looks):
+    """Entered are out, captured or free; nothing is released while the field is on."""
+    assert [missing([one]) for one in looks] == [0] * len(looks)
+    entered, captures, releases = (
+        np.array([one.work[name] for one in looks]) for name in ("entered", "captures", "releases")
+    )
+    assert (np.diff(entered) >= 0).all()
+    assert entered[0] == entered[-1] == 60
+    held = [particle_balance(one.work, one.state).captured for one in looks]
+    np.testing.assert_array_equal(held, captures - releases)
+    assert (releases[:3] == 0).all()
+    assert releases[-1] > 5
+    assert captures[3] > captures[0]
 
 
 @pytest.mark.slow
