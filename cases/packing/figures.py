@@ -10,6 +10,7 @@ from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.packing_fractions import packing_fraction
 from tisim.cases.packing import curves, snapshots
 from tisim.cases.packing.measures import contact_counts
+from tisim.cases.packing.overlap_removal import removal_figure, removal_table, removals
 from tisim.cases.packing.snapshots import Packing
 from tisim.cases.packing.studies import PackedRow, Study, measured_packings, plans, table
 from tisim.engine.batches import Progress, progress_of_part
@@ -45,14 +46,20 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """rods.png, inertia.png, cylinder.png, wedge.png, superballs.png: densities, contacts and order; pictures
     of packings in cylinders.png, wedges.png and superball_packings.png; wedge_directions.png; structure.png
-    with neighbours and pores; and packings.csv with all packings of a size."""
+    with neighbours and pores; overlaps.png and overlaps.csv, the overlaps of triples by attempt; and
+    packings.csv with all packings of a size."""
     made: dict[Study, list[Packing]] = {}
     for k, study in enumerate(DRAWN):
         part = progress_of_part(progress, k, len(DRAWN))
         found = measured_packings(plans(study), size, starts_of(study, size), part)
         made[study] = [(row, one.bodies) for row, one in found]
     rows = [row for some in made.values() for row, _ in some]
-    return {**drawn(made), "packings.csv": table(rows)}
+    removed = removals(size)
+    overlaps: dict[str, Figure | str] = {
+        "overlaps.png": removal_figure(removed),
+        "overlaps.csv": removal_table(removed),
+    }
+    return {**drawn(made), **overlaps, "packings.csv": table(rows)}
 
 
 def starts_of(study: Study, size: str) -> int:

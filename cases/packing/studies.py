@@ -219,8 +219,8 @@ def plans(study: Study) -> list[PackedPlan]:
         limits = [replace(one, limit=limit) for one in (spheres, rods) for limit in (200, 2000, 20_000)]
         tolerances = [replace(spheres, tolerance=one) for one in (1e-3, 1e-5)]
         published = replace(spheres, number=500, start=0.05, step=PUBLISHED_STEP)
-        both = [replace(published, limit=100_000, method=method) for method in ("original", "revised")]
-        steps = [replace(spheres, step=PUBLISHED_STEP), published, *both]
+        full = [replace(published, limit=100_000, method=method) for method in ("original", "revised")]
+        steps = [replace(spheres, step=PUBLISHED_STEP), published, *full]
         return [*limits, *tolerances, *steps]
     # The search for contacts of superquadrics takes long.
     return [PackedPlan(study, one, "revised", number=100, limit=500) for one in EXPONENTS]
