@@ -104,8 +104,10 @@ def command_fault(command: str) -> str:
     if program != "python" or not words:
         return "must begin with tisim or python"
     if words[0] == "-m":
-        spec = importlib.util.find_spec(words[1])
-        path, words = Path(spec.origin) if spec and spec.origin else Path(words[1]), words[2:]
+        path = ROOT / f"{words[1].replace('.', '/')}.py"
+        if not path.is_file() and (spec := importlib.util.find_spec(words[1])) and spec.origin:
+            path = Path(spec.origin)
+        words = words[2:]
     else:
         path, words = ROOT / words[0], words[1:]
     if not path.is_file():

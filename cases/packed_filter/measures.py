@@ -7,6 +7,7 @@ import numpy as np
 from tisim import Result, Scene
 from tisim.accuracy import Quantity
 from tisim.analysis import particle_balance
+from tisim.errors import must
 from tisim.sources import MagneticCylinders, MagneticField, PoreFlow
 
 SIZE_CLASSES = 6
@@ -55,11 +56,13 @@ def captures_by_angle(result: Result, time: float = np.inf) -> np.ndarray:
     the angle between fibre and field, shape (ANGLE_CLASSES,).
 
     The first class has the fibres across the field, up to |cos| = 1/ANGLE_CLASSES, and the last one those
-    along it. Images capture for their fibre. NaN for a class without fibres. The result must be of a field
-    that was never switched off.
+    along it. Images capture for their fibre. NaN for a class without fibres, or without any captures. The
+    field must still be on at the end of the run, as captures of released colloids are not known.
     """
+    source = next(one for one in result.scene.effects if isinstance(one, MagneticField))
+    must(source.end > result.time, "magnetic_field.end", "after the end of the run", source.end)
     magnets = next(one for one in result.scene.effects if isinstance(one, MagneticCylinders)).cylinders
-    field = next(one for one in result.scene.effects if isinstance(one, MagneticField)).constant
+    field = source.constant
     centre, axis = (np.array([getattr(one, name) for one in magnets]) for name in ("centre", "direction"))
     cosine = np.abs(axis @ field) / np.linalg.norm(field)
     kind = np.minimum((ANGLE_CLASSES * cosine).astype(int), ANGLE_CLASSES - 1)
@@ -68,7 +71,7 @@ def captures_by_angle(result: Result, time: float = np.inf) -> np.ndarray:
     by = result.state["captured_by"][captured_by(result, time)]
     captures = np.bincount(kind[by], minlength=ANGLE_CLASSES)
     with np.errstate(divide="ignore", invalid="ignore"):
-        each: np.ndarray = captures / fibres * fibres.sum() / max(captures.sum(), 1)
+        each: np.ndarray = captures / fibres * fibres.sum() / captures.sum()
     return each
 
 

@@ -61,12 +61,13 @@ def measure(number, starts, bodies):
             begun = used()
             results = run(made)
             elapsed = used() - begun
-            packed = Mean.of([one.measures["packing_fraction"] for one in results])
+            fractions = [one.measures["packing_fraction"] for one in results]
+            packed, deviation = Mean.of(fractions), np.std(fractions, ddof=1) if starts > 1 else np.nan
             touching = Mean.of([measured(one).touching for one in results])
             steps = np.mean([result.work["steps"] for result in results])
             print(
-                f"{protocol:32} {name:14} {packed}, contacts up to 1e-4 D {touching}, "
-                f"{steps:9.0f} steps {elapsed / starts:7.1f} s",
+                f"{protocol:32} {name:14} {packed} (deviation {deviation:.4f}), "
+                f"contacts up to 1e-4 D {touching}, {steps:9.0f} steps {elapsed / starts:7.1f} s",
                 flush=True,
             )
 

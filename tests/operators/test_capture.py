@@ -156,7 +156,6 @@ def test_fixed_particles_start_at_rest_and_stay():
 
 
 @pytest.mark.long
-@pytest.mark.slow
 def test_fibres_in_cells_capture_as_all_fibres_do():
     """With ``sum_digits`` only the fibres near the cell of a particle are compared with it. Particles fly
     through empty space from one group of fibres to another; the results agree to the bit."""

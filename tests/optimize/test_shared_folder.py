@@ -65,8 +65,7 @@ def test_a_search_reuses_the_runs_of_others(tmp_path):
     assert again.hits >= 2
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("methods", [METHODS[:2], METHODS])
+@pytest.mark.parametrize("methods", [METHODS[:2], pytest.param(METHODS, marks=pytest.mark.slow)])
 def test_several_processes_with_different_methods(tmp_path, methods):
     folder = tmp_path / "both"
     at_work = [worker("shared", folder, method, 1, stderr=subprocess.PIPE) for method in methods]

@@ -7,7 +7,14 @@ from scipy.special import gamma
 
 from tests.shapes.pairs import spiral
 from tisim import InputError
-from tisim.effects import HardRods, HardSuperquadrics, RigidRods, RigidSuperquadrics
+from tisim.effects import (
+    HardMixture,
+    HardRods,
+    HardSuperquadrics,
+    RigidMixture,
+    RigidRods,
+    RigidSuperquadrics,
+)
 from tisim.shapes import EllipsoidShape, SphereShape, SpherocylinderShape, SuperquadricShape
 
 SHAPES = (
@@ -188,7 +195,7 @@ def test_effects_take_shapes_of_any_class_that_have_their_form():
         assert kind(rods=given).rods == (
             SpherocylinderShape(length=0.0, diameter=2.0), SpherocylinderShape(length=3.0, diameter=1.0), rod
         )  # fmt: skip
-        rule = "must be a spherocylinder_shape, or a shape of the form of one; received EllipsoidShape"
+        rule = "must be a spherocylinder_shape or sphere_shape; received EllipsoidShape"
         with pytest.raises(InputError, match=rf"^{kind.kind()}.rods\[1\] {rule}"):
             kind(rods=(rod, ellipsoid))
     ball, axes = ((1.0,) * 3, (2.0,) * 3), (1.0, 2.0, 3.0)
@@ -196,9 +203,13 @@ def test_effects_take_shapes_of_any_class_that_have_their_form():
     for kind in (HardSuperquadrics, RigidSuperquadrics):
         made = kind(superquadrics=(sphere, ellipsoid, known)).superquadrics
         assert [one.superquadric() for one in made] == [ball, (axes, (2.0,) * 3), (axes, (3.0,) * 3)]
-        rule = "must be a superquadric_shape, or"
+        rule = "must be a superquadric_shape, ellipsoid_shape or sphere_shape; received Sphero"
         with pytest.raises(InputError, match=rf"^{kind.kind()}.superquadrics\[0\] {rule}"):
             kind(superquadrics=[rod])
+    for kind in (HardMixture, RigidMixture):
+        mixed = kind(rods=(sphere, rod), superquadrics=(ellipsoid, sphere))
+        assert [one.rod() for one in mixed.rods] == [(0.0, 1.0), (0.5, 0.25)]
+        assert [one.superquadric() for one in mixed.superquadrics] == [(axes, (2.0,) * 3), ball]
     with pytest.raises(InputError, match=r"^hard_rods.rods.1.length must be given"):
         HardRods(rods=[sphere, {"diameter": 1}])
 

@@ -117,7 +117,6 @@ def test_moments_vanish_after_the_end(law):
     assert np.abs(force).max() <= 1e-20 * np.abs(pulled).max()
 
 
-@pytest.mark.slow
 def test_a_charge_flies_straight_before_and_after_a_pulse():
     """A magnetic field between two times turns the velocity by w (end - begin), w = q B/m, on a circle of
     radius v/w; an electric field then adds q E/m times the time for which it acts. Outside of the pulses the

@@ -16,7 +16,7 @@ from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 GAP_BINS = 20
-"""Intervals of the gap in the pair correlation of surfaces."""
+"""Number of intervals of the gap in the pair correlation of surfaces."""
 
 
 def directions(histograms: Mapping[str, DirectionHistogram]) -> Figure:
@@ -54,6 +54,8 @@ def structure(packings: Mapping[str, PackedBodies], spacing: float = 0.1, reach:
     """
     must(len(packings) > 0, "packings", "at least one", len(packings))
     must(reach > 0, "reach", "above 0", reach)
+    for title, one in packings.items():
+        must(all(one.periodic), f"packing {title!r}", "periodic along all axes", one.periodic)
     figure = empty(12.6, 3.9)
     near, pores, paths = panels = figure.subplots(1, 3)
     porosity = []

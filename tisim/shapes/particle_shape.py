@@ -99,12 +99,12 @@ class ParticleShape(Component):
         return points
 
 
-def converted(kind: type[ParticleShape], where: str, shapes: Any) -> Any:
+def converted(kind: type[ParticleShape], names: str, where: str, shapes: Any) -> Any:
     """Return a list of shapes as shapes of one class; other values, such as tables of a file, as they are.
-    InputError, naming ``where``, if a shape has no equal of this class."""
+    InputError, with ``where`` and the ``names`` of suitable shapes, if a shape has no equal of this class."""
     if not isinstance(shapes, list | tuple):
         return shapes
-    rule = f"a {kind.kind()}, or a shape of the form of one"
+    rule = f"a {names}"
     of = [kind.of(one) if isinstance(one, ParticleShape) else one for one in shapes]
     for k, (one, shape) in enumerate(zip(of, shapes, strict=True)):
         must(one is not None, f"{where}[{k}]", rule, shape)

@@ -113,6 +113,28 @@ def test_the_limit_of_small_voxels_is_closer_to_rayleigh():
     assert np.isinf(packing_diffusion(closed, 0.1).tortuosity)
 
 
+def test_images_that_cannot_be_extrapolated_are_refused():
+    """Overlapping spheres of 1.3 leave openings that the larger voxels close; a lattice without bodies in its
+    whole height has the same diffusion in images whose numbers of voxels are not 2 to 1."""
+    places = np.stack(np.meshgrid(*3 * [np.arange(3) + 0.5], indexing="ij"), -1).reshape(-1, 3)
+    narrow = PackedBodies.of(SphereShape(diameter=1.3), places, (0, 0, 0), (3, 3, 3))
+    with pytest.raises(InputError, match=r"^spacing must be small enough that .* received 0.05"):
+        packing_diffusion(narrow, 0.05)
+    opened = PackedBodies.of(
+        SphereShape(diameter=1.0), places, (0, 0, 0), (3, 3, 3), periodic=(True, True, False)
+    )
+    with pytest.raises(InputError, match=r"^periodic must be true along all axes"):
+        packing_diffusion(opened, 0.1)
+
+
+def test_sides_of_voxels_in_another_ratio_than_two():
+    """A box of 11 voxels has 6 of about twice the side; the exact ratio extrapolates as 12 and 6 do."""
+    sphere = PackedBodies.of(SphereShape(diameter=0.8), [[0.5, 0.5, 0.5]], (0, 0, 0), (1, 1, 1))
+    fine, coarse = (pore_diffusion(pore_image(sphere, 1 / n)).relative for n in (11, 6))
+    expected = fine + (fine - coarse) / (11 / 6 - 1)
+    assert packing_diffusion(sphere, 1 / 11).relative == pytest.approx(expected, rel=1e-12)
+
+
 def test_cylinders_across_the_flux_obstruct_as_rayleigh_found():
     """D_eff/D = 1 - 2 phi/(1 + phi - 0.3058 phi^4), in a slab one voxel thick."""
     n, phi = 150, 0.5

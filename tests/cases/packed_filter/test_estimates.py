@@ -14,12 +14,14 @@ from tisim.cases.packed_filter.matrix import Matrix
 from tisim.cases.packed_filter.measures import (
     SIZE_CLASSES,
     captured_fraction,
+    captures_by_angle,
     missing,
     penetration,
     penetration_of_layers,
     released_fraction,
 )
 from tisim.cases.packed_filter.scene import PackedFilter, filter_of
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField
 from tisim.sources.switched import NO_END
 
 
@@ -90,6 +92,25 @@ def test_measures_count_colloids_that_have_entered():
     assert missing([result]) == 0
     result.work["exited"] += 1
     assert missing([result]) == 1
+
+
+def test_captures_by_angle_are_over_the_mean_of_all_fibres():
+    """Two fibres across the field and one along it, and an image of the latter outside the box. They have
+    captured two, none, one and, for the image, one. Two of four captures are by a third of the fibres."""
+    result = ended([0, 0, 2, 3, -1])
+    axes, centres = [(0, 1, 0), (0.2, 0, 1), (1, 0, 0), (1, 0, 0)], [(0, 0, 1e-3)] * 3 + [(2e-3, 0, 1e-3)]
+    fibres = [
+        Cylinder(centre=centre, axis=axis, radius=1e-4, length=1e-3)
+        for centre, axis in zip(centres, axes, strict=True)
+    ]
+    field = MagneticField(constant=(2.0, 0, 0))
+    result.scene.effects, result.time = (field, MagneticCylinders(cylinders=fibres)), 9.0
+    np.testing.assert_allclose(captures_by_angle(result), [0.75, np.nan, 1.5])
+    # Nothing was captured before 5 s.
+    assert np.isnan(captures_by_angle(result, 4.0)).all()
+    result.scene.effects = (MagneticField(constant=(2.0, 0, 0), end=8.0), *result.scene.effects[1:])
+    with pytest.raises(InputError, match=r"^magnetic_field.end must be after the end of the run; received 8"):
+        captures_by_angle(result)
 
 
 def test_objectives_are_taken_to_one_depth():

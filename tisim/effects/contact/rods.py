@@ -27,8 +27,10 @@ class Rods(Shaped):
 
     @field_validator("rods", mode="before")
     @classmethod
-    def _of_any_class(cls, shapes: Any) -> Any:
-        return converted(SpherocylinderShape, f"{cls.kind()}.rods", shapes)
+    def _as_rods(cls, shapes: Any) -> Any:
+        return converted(
+            SpherocylinderShape, "spherocylinder_shape or sphere_shape", f"{cls.kind()}.rods", shapes
+        )
 
     def shapes(self) -> Sequence[ParticleShape]:
         return self.rods

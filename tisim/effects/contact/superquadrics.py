@@ -30,8 +30,9 @@ class Superquadrics(Shaped):
 
     @field_validator("superquadrics", mode="before")
     @classmethod
-    def _of_any_class(cls, shapes: Any) -> Any:
-        return converted(SuperquadricShape, f"{cls.kind()}.superquadrics", shapes)
+    def _as_superquadrics(cls, shapes: Any) -> Any:
+        names = "superquadric_shape, ellipsoid_shape or sphere_shape"
+        return converted(SuperquadricShape, names, f"{cls.kind()}.superquadrics", shapes)
 
     def shapes(self) -> Sequence[ParticleShape]:
         return self.superquadrics

@@ -53,8 +53,8 @@ class PackingStepper(Stepper):
 
     The phases of a step end with ``BeginStep``, a subclass of ``MoveBodies``, ``CheckWidth`` and ``Advance``.
     Before these, a step sets ``growth`` of the world. The counter ``jammed`` of the result is 1 if a world
-    has ended because its bodies could not be brought closer, and 0 if its duration was reached first; the
-    reason of its status says the same.
+    has ended because its bodies could not be brought closer, and 0 if it has reached its duration, or a
+    density that was its target; the reason of its status says the same.
 
     confines : whether bodies may be packed between walls.
     """
