@@ -74,7 +74,9 @@ class PackedPlan:
 
     shape : aspect ratio of rods, or exponent of superballs. width : D_cyl or l_w (D). angle : of a wedge
     (degrees). inertia : xi over the moment of inertia. number, start, step, limit, halvings, tolerance : of
-    ``scene``, whose ``attempts`` is ``limit``; None for the value of the size.
+    ``scene``, whose ``attempts`` is ``limit``; None for the value of the size. ``number`` and ``limit`` are
+    for the size "default", and in proportion for others; ``published`` is the number of bodies in B16, for
+    the size "paper", if it is not that of the size.
     """
 
     study: Study
@@ -89,6 +91,7 @@ class PackedPlan:
     limit: int | None = None
     halvings: int | None = None
     tolerance: float | None = None
+    published: int | None = None
 
     def body(self) -> ParticleShape:
         """Return the shape of the bodies."""
@@ -104,8 +107,11 @@ class PackedPlan:
         around, start = self.container(), self.start
         if around is not None and start is None:
             start = CONFINED_START
-        own = {"start": start, "step": self.step, "attempts": self.limit, "halvings": self.halvings}
-        own |= {"tolerance": self.tolerance, "number": self.least_number(self.number or usual["number"])}
+        own = {"start": start, "step": self.step, "halvings": self.halvings, "tolerance": self.tolerance}
+        own["attempts"] = at_size(self.limit, "attempts", size)
+        number = self.published if size == "paper" else None
+        number = number or at_size(self.number, "number", size) or usual["number"]
+        own["number"] = self.least_number(number)
         options = usual | {key: value for key, value in own.items() if value is not None}
         if self.step is None:
             # The same relative step of the volume, however many bodies the box needs.
@@ -122,6 +128,14 @@ class PackedPlan:
         dense = 0.75 if self.shape < 5 else min(0.75, 6.0 / self.shape)
         section = (2.1 * length) ** 2 if around is None else around.volume_in(np.ones(3), 1.0)
         return max(usual, int(np.ceil(dense * section * 2.1 * length / body.volume())))
+
+
+def at_size(value: int | None, name: str, size: str) -> int | None:
+    """Return a number for the size "default" in proportion to a setting of another size; None for None."""
+    if value is None:
+        return None
+    here, default = (size_named(one, SIZES).scene[name] for one in (size, "default"))
+    return max(1, round(value * here / default))
 
 
 @dataclass(frozen=True)
@@ -223,7 +237,7 @@ def plans(study: Study) -> list[PackedPlan]:
         steps = [replace(spheres, step=PUBLISHED_STEP), published, *full]
         return [*limits, *tolerances, *steps]
     # The search for contacts of superquadrics takes long.
-    return [PackedPlan(study, one, "revised", number=100, limit=500) for one in EXPONENTS]
+    return [PackedPlan(study, one, "revised", number=100, limit=500, published=750) for one in EXPONENTS]
 
 
 def long_rods(study: Study, aspect: float) -> PackedPlan:
@@ -236,7 +250,7 @@ def long_rods(study: Study, aspect: float) -> PackedPlan:
     number = PackedPlan(study, aspect).least_number(1)
     final = number * aspect / 5.0  # volume of the box, in volumes of a rod
     step = 1e-3 * rod(aspect).volume() * final
-    return PackedPlan(study, aspect, start=2.0 / aspect, step=step, limit=1000, number=number)
+    return PackedPlan(study, aspect, start=2.0 / aspect, step=step, limit=1000)
 
 
 def shortest(aspect: float, angle: float) -> float:

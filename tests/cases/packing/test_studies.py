@@ -70,6 +70,19 @@ def test_rows_of_a_study():
     assert [(one.study, one.seed) for one, _ in others] == [("cylinder", 1)]
 
 
+def test_the_effort_of_a_plan_is_in_proportion_to_the_size():
+    """B16 has 500 bodies and 100,000 attempts, and 750 superballs."""
+    balls, xi = plans("superballs")[0], plans("moment of inertia")[0]
+    found = [
+        [one.options(size)[name] for size in ("small", "default", "paper")]
+        for one in (balls, xi)
+        for name in ("number", "attempts")
+    ]
+    assert found == [[30, 100, 750], [50, 500, 25_000], [60, 200, 500], [100, 1000, 50_000]]
+    long = plans("long rods")[0]
+    assert long.options("default")["number"] == long.least_number(1) == long.options("small")["number"]
+
+
 def test_plans_are_packings_of_their_own():
     for study in STUDIES:
         keys = [tuple(map(str, vars(plan).values())) for plan in plans(study)]
