@@ -18,7 +18,7 @@ from tisim.cases.packing.scene import hard, rod
 from tisim.components.component import option
 from tisim.effects.base import HardBodies
 from tisim.numerics import philox
-from tisim.numerics.random_streams import TRIAL_MOVES
+from tisim.numerics.random_streams import RANDOM_REMOVAL
 from tisim.plotting.style import empty, letters, plain
 from tisim.steppers import MechanicalContraction
 from tisim.steppers.context import Step, StepContext
@@ -94,10 +94,11 @@ class RandomMotions(RemoveOverlaps):
     @ti.func
     def direction(self, w, i, draw: ti.template()):  # type: ignore[valid-type]
         """Return a random unit vector."""
-        u = philox.uniform(philox.bits(self.s.seed[w], TRIAL_MOVES, self.s.id[w, i], self.s.steps[w], draw))
+        s = self.s
+        u = philox.uniform(philox.bits(s.seed[w], RANDOM_REMOVAL, s.id[w, i], s.steps[w], draw))
         z, angle = 2.0 * u[0] - 1.0, 2.0 * ti.math.pi * u[1]
         across = ti.sqrt(1.0 - z * z)
-        return ti.cast(ti.Vector([across * ti.cos(angle), across * ti.sin(angle), z]), self.s.real)
+        return ti.cast(ti.Vector([across * ti.cos(angle), across * ti.sin(angle), z]), s.real)
 
 
 METHODS: Mapping[str, tuple[type[MechanicalContraction], dict[str, Any]]] = {

@@ -7,6 +7,8 @@ BROWNIAN_MOTION = 1
 """Stream of the thermal noise of Brownian steppers."""
 TRIAL_MOVES = 0x54524D56
 """Stream of the trial moves of growing hard bodies."""
+RANDOM_REMOVAL = 0x52524D00
+"""Stream of the random directions in which overlaps of rods are removed, for comparison (case packing)."""
 SEQUENTIAL_ADDITION = 0x52534100
 """Stream of the trial positions of random sequential addition."""
 GRAIN_SIZES = 0x47524149
