@@ -166,12 +166,12 @@ def coincident_bodies():
     for shape in (SPHERE, LONG_ROD, superball(4.0)):
         places, turns, box = coincident(shape)
         method = "original" if shape.rod() else "revised"
-        # A search for the contact of superquadrics that overlap deeply takes 17 starts.
-        duration = 3000.0 if shape.rod() else 300.0
-        for stepper in (
-            contraction(volume_step=1e-3, method=method),
-            minimisation(fraction_step=1e-5),
-            growth(rate=1e-9, precision=1e-9),
+        # Trial moves of superballs that overlap deeply are searched from 17 directions each.
+        moves = 3000.0 if shape.rod() else 1000.0
+        for stepper, duration in (
+            (contraction(volume_step=1e-3, method=method), 3000.0),
+            (minimisation(fraction_step=1e-5), 3000.0),
+            (growth(rate=1e-9, precision=1e-9), moves),
         ):
             scenes.append(packing(hard(shape), places, box, stepper, duration, orientation=turns))
     results = each_in(scenes)
