@@ -53,6 +53,8 @@ WEDGE_LENGTHS = (1.2, 3.0)
 """Lengths l_w of wedges over the shortest one that holds a row of rods (B16 (2.12))."""
 LONG_WEDGE, MANY_ATTEMPTS = 6.0, 20_000
 """Length of a wedge over the shortest one, and attempts, that show whether either changes the alignment."""
+DENSEST_START = 1.0
+"""Largest packing fraction of a start, times Lambda, at which rods find places at random."""
 CONFINED_START = 0.03
 """Packing fraction of a start in a cylinder or a wedge, much of which bodies cannot reach."""
 EXPONENTS = (2.0, 2.5, 3.0, 4.0, 5.0)
@@ -107,6 +109,9 @@ class PackedPlan:
         around, start = self.container(), self.start
         if around is not None and start is None:
             start = CONFINED_START
+        elif start is None and self.study != "superballs":
+            # Long rods find no places at random in a dense start.
+            start = min(usual["start"], DENSEST_START / self.shape)
         own = {"start": start, "step": self.step, "halvings": self.halvings, "tolerance": self.tolerance}
         own["attempts"] = at_size(self.limit, "attempts", size)
         number = self.published if size == "paper" else None

@@ -79,6 +79,9 @@ def test_the_effort_of_a_plan_is_in_proportion_to_the_size():
         for name in ("number", "attempts")
     ]
     assert found == [[30, 100, 750], [50, 500, 25_000], [60, 200, 500], [100, 1000, 50_000]]
+    starts = [PackedPlan("aspect ratio", one).options("small")["start"] for one in (1.0, 5.0, 10.0)]
+    assert starts == [0.2, 0.2, 0.1]
+    assert PackedPlan("aspect ratio", 10.0).options("default")["start"] == 0.1
     long = plans("long rods")[0]
     assert long.options("default")["number"] == long.least_number(1) == long.options("small")["number"]
 
