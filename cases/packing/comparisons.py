@@ -77,7 +77,7 @@ def compared(study: Study, rows: Sequence[PackedRow], free: Sequence[PackedRow] 
         "wedge": lambda some: of_wedges(some, free),
         "superballs": of_superballs,
         "effort": of_effort,
-        "wedge effort": of_wedge_effort,
+        "wedge effort": lambda some: of_wedge_effort(some, free),
     }
     return list(made[study](rows))
 
@@ -222,7 +222,7 @@ def of_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
         yield Compared(f"{method}, {subject}", "", f"{text(mean)}, {both}")
 
 
-def of_wedge_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
+def of_wedge_effort(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterator[Compared]:
     columns = ("shape", "angle", "width", "number", "limit")
     by = {name: means(rows, columns, name) for name in ("aligned", "fraction", "contacts")}
     for key, aligned in by["aligned"].items():
@@ -231,4 +231,8 @@ def of_wedge_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
         subject = f"Lambda {aspect:g}, {angle:g} degrees, {length:.2g} l_min, {number} rods, {limit} attempts"
         fraction, contacts = text(by["fraction"][key]), text(by["contacts"][key])
         here = f"f_align {text(aligned)}, packing fraction {fraction}, contacts {contacts}"
+        if chosen(free, shape=aspect, method="original"):
+            full, low = periodic(free, aspect), shortest_fraction(aspect, angle)
+            star = scaled(by["fraction"][key], full["fraction"], low)
+            here += f", phi* {text(star)}, <C>* {text(scaled(by['contacts'][key], full['contacts']))}"
         yield Compared(subject, "f_align above 0.8", here)

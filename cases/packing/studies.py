@@ -77,8 +77,8 @@ class PackedPlan:
     shape : aspect ratio of rods, or exponent of superballs. width : D_cyl or l_w (D). angle : of a wedge
     (degrees). inertia : xi over the moment of inertia. number, start, step, limit, halvings, tolerance : of
     ``scene``, whose ``attempts`` is ``limit``; None for the value of the size. ``number`` and ``limit`` are
-    for the size "default", and in proportion for others; ``published`` is the number of bodies in B16, for
-    the size "paper", if it is not that of the size.
+    for the size "default"; other sizes have them in proportion. published : number of bodies at the size
+    "paper", where B16 has other than 500.
     """
 
     study: Study
@@ -136,7 +136,8 @@ class PackedPlan:
 
 
 def at_size(value: int | None, name: str, size: str) -> int | None:
-    """Return a number for the size "default" in proportion to a setting of another size; None for None."""
+    """Return a number that is given for the size "default", in proportion to a setting of another size; None
+    for None."""
     if value is None:
         return None
     here, default = (size_named(one, SIZES).scene[name] for one in (size, "default"))

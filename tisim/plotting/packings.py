@@ -48,7 +48,7 @@ def structure(packings: Mapping[str, PackedBodies], spacing: float = 0.1, reach:
     law for spheres, eps^(-1/2).
 
     packings : by title, periodic along all axes. spacing : side of a voxel, and reach : largest gap, both in
-        D, the shortest side of the box around the first body. A packing of 200 bodies takes some seconds.
+        D, the shortest side of the box around the first body. A packing of 200 bodies takes some ten seconds.
 
     Source: D. A. G. Bruggeman, Ann. Phys. 416 (1935) 636, for the law.
     """

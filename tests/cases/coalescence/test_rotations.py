@@ -70,7 +70,7 @@ def test_elongations_and_spins_of_each_start():
 
 
 def test_the_text_and_the_picture_of_clouds(monkeypatch):
-    # The drawing of a cloud takes seconds, and is tested with that of the asteroids of test_runs.py.
+    # A picture of a cloud takes seconds; test_runs.py draws one.
     drawn = []
     monkeypatch.setattr(rotations, "close_up", lambda axis, *given: drawn.append(axis))
     text = report(FOUND).splitlines()

@@ -1,5 +1,7 @@
 """Studies of the case packing: their packings, their tables, and the numbers of B16 beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -150,6 +152,13 @@ def test_efforts_in_a_wedge_are_compared_by_attempts_and_by_length():
     lines = ("3 l_min, 200 rods, 2000", "3 l_min, 200 rods, 20000", "6 l_min, 200 rods, 2000")
     assert list(found) == [f"Lambda 3, 45 degrees, {one} attempts" for one in lines]
     assert [one.split()[1] for one in found.values()] == ["0.7", "0.8", "0.75"]
+    assert not any("phi*" in one for one in found.values())
+    # Beside rods in a periodic box: halfway from one row of rods to their density, and at their contacts.
+    half = (shortest_fraction(3.0, 45.0) + 0.6) / 2
+    rows = [replace(one, fraction=half) for one in rows]
+    for one in compared("wedge effort", rows, FREE):
+        assert one.here.split("phi* ")[1].startswith("0.500")
+        assert one.here.split("<C>* ")[1].startswith("1")
 
 
 def test_wedges_beside_b16():

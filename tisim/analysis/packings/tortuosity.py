@@ -104,7 +104,7 @@ def packing_diffusion(packing: PackedBodies, spacing: float, axis: int = 2) -> P
     fine, coarse = (pore_diffusion(image, axis) for image in images)
     if not fine.relative:
         return fine
-    # Numbers of voxels are whole, so that the ratio of their sides differs from 2.
+    # Numbers of voxels are whole, so the ratio of their sides need not be 2.
     ratio = images[0].shape[axis] / images[1].shape[axis]
     near = 0 < coarse.relative < ratio * fine.relative
     rule = "small enough that diffusion through voxels of twice this side is similar"
