@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from tisim.analysis import Mean
 from tisim.cases.case import Claim, Shown
-from tisim.cases.packing.studies import PackedPlan, PackedRow, packed
+from tisim.cases.packing.studies import PackedPlan, packed
+from tisim.cases.packing.study_table import PackedRow
 
 CHECK_STARTS = 5
 CHECKED_ASPECTS = (1.0, 1.4, 3.0)

@@ -10,7 +10,8 @@ from scipy.stats import linregress, t
 from tisim.analysis import Mean
 from tisim.analysis.packings.orientational_order import random_nematic_order, random_order
 from tisim.cases.packing.scene import rod
-from tisim.cases.packing.studies import PackedRow, Study, means, shortest
+from tisim.cases.packing.studies import shortest
+from tisim.cases.packing.study_table import PackedRow, Study, means
 
 CONTACTS_OF_RODS = 10.0
 """Contact number of the random contact equation phi L/D = <C>/2 = 5 for thin rods."""

@@ -16,7 +16,8 @@ from tisim.cases.packing.comparisons import (
     scaled,
     shortest_fraction,
 )
-from tisim.cases.packing.studies import PackedRow, means, shortest
+from tisim.cases.packing.studies import shortest
+from tisim.cases.packing.study_table import PackedRow, means
 from tisim.plotting.style import empty, letters, plain
 
 COLOURS = ("#4477aa", "#cc6677", "#228833", "#ccbb44", "#aa3377")

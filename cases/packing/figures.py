@@ -12,7 +12,8 @@ from tisim.cases.packing import curves, snapshots
 from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.overlap_removal import removal_figure, removal_table, removals
 from tisim.cases.packing.snapshots import Packing
-from tisim.cases.packing.studies import PackedRow, Study, measured_packings, plans, table
+from tisim.cases.packing.studies import measured_packings, plans
+from tisim.cases.packing.study_table import PackedRow, Study, table
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
 from tisim.plotting.packings import structure

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.analysis.packings.wall_alignment import direction_histogram
 from tisim.cases.packing.measures import contact_counts
-from tisim.cases.packing.studies import PackedRow, container_of, shortest
+from tisim.cases.packing.studies import container_of, shortest
+from tisim.cases.packing.study_table import PackedRow
 from tisim.geometry.container import Container
 from tisim.geometry.tessellation import sharp_edges
 from tisim.plotting.bodies import draw_bodies

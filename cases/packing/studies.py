@@ -1,36 +1,21 @@
 """Sets of packings, each of which answers one question of B16 chapters 2 to 4."""
 
-import csv
-import io
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields, replace
-from typing import Any, Literal, get_args
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from tisim.analysis import Mean
 from tisim.analysis.packings.wall_alignment import wall_alignment
 from tisim.cases.case import size_named
-from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.packing.measures import MeasuredPacking, packings
 from tisim.cases.packing.scene import PUBLISHED_STEP, SIZES, of_shape, rod, superball
+from tisim.cases.packing.study_table import PackedRow, Study, key_of
 from tisim.engine.batches import Progress
 from tisim.geometry import CylindricalContainer, WedgeContainer
 from tisim.geometry import container as containers
 from tisim.shapes.particle_shape import ParticleShape
 
-Study = Literal[
-    "aspect ratio",
-    "long rods",
-    "longest rods",
-    "cylinder",
-    "wedge",
-    "superballs",
-    "moment of inertia",
-    "effort",
-    "wedge effort",
-]
-STUDIES: tuple[Study, ...] = get_args(Study)
 ASPECTS = (1.0, 1.1, 1.25, 1.4, 1.5, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 10.0)
 """Aspect ratios Lambda of rods in a periodic box."""
 REVISED_ASPECTS = (1.0, 1.5, 3.0, 5.0, 10.0)
@@ -144,46 +129,6 @@ def at_size(value: int | None, name: str, size: str) -> int | None:
     return max(1, round(value * here / default))
 
 
-@dataclass(frozen=True)
-class PackedRow:
-    """A packing of a study: a line of its table, which begins with what is known before it is packed.
-
-    Lengths are in D; an angle is in degrees; NaN where it does not apply. step : first step of the volume, in
-    volumes of a body. limit : attempts for a contraction. attempts : of the whole run.
-    """
-
-    study: str
-    method: str
-    shape: float
-    width: float
-    angle: float
-    inertia: float
-    number: int
-    step: float
-    limit: int
-    halvings: int
-    tolerance: float
-    seed: int
-    attempts: int
-    fraction: float
-    contacts: float
-    touching: float
-    held: float
-    nematic: float
-    cubatic: float
-    aligned: float
-
-    def key(self) -> tuple[str, ...]:
-        """Return the columns that identify the packing."""
-        return key_of({name: getattr(self, name) for name in IDENTITY})
-
-    def place(self) -> tuple[Any, ...]:
-        """Return the place of the packing among those of its study, by which they are sorted."""
-        # NaN has no place.
-        numbers = np.nan_to_num([self.shape, self.angle, self.width, self.inertia, self.limit, self.seed])
-        return (self.method, *numbers.tolist())
-
-
 def container_of(one: PackedPlan | PackedRow) -> containers.Container | None:
     """Return the container of a packing; None for a periodic box."""
     if one.study == "cylinder":
@@ -193,8 +138,6 @@ def container_of(one: PackedPlan | PackedRow) -> containers.Container | None:
     return None
 
 
-IDENTITY = tuple(one.name for one in fields(PackedRow)[:12])
-"""Columns that are known before a packing is made."""
 MEASURES = ("fraction", "contacts", "touching", "held", "nematic", "cubatic")
 """Columns that are measures of the packing by itself."""
 
@@ -304,12 +247,6 @@ def given(plan: PackedPlan, options: Mapping[str, Any], seed: int) -> dict[str, 
     return {**by, **effort, "limit": options["attempts"], "seed": seed}
 
 
-def key_of(known: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the columns that identify a packing as text."""
-    values = [known[name] for name in IDENTITY]
-    return tuple(f"{one:.12g}" if isinstance(one, float | int) else one for one in values)
-
-
 def row(plan: PackedPlan, known: Mapping[str, Any], one: MeasuredPacking) -> PackedRow:
     """Return the line of a packing."""
     measures = {name: getattr(one, name) for name in MEASURES}
@@ -330,24 +267,3 @@ def plan_of(one: PackedRow) -> PackedPlan:
     """Return the plan of a line without its effort."""
     by = {name: getattr(one, name) for name in ("shape", "method", "width", "angle", "inertia")}
     return PackedPlan(one.study, **by)  # type: ignore[arg-type]
-
-
-def table(rows: Iterable[PackedRow]) -> str:
-    """Return rows as CSV."""
-    return csv_text([[one.name for one in fields(PackedRow)], *(astuple(one) for one in rows)])
-
-
-def read(text: str) -> list[PackedRow]:
-    """Return the rows of a table."""
-    types: Mapping[str, Callable[[str], Any]] = {"str": str, "float": float, "int": int}
-    kinds = [types[getattr(one.type, "__name__", str(one.type))] for one in fields(PackedRow)]
-    lines = list(csv.reader(io.StringIO(text)))[1:]
-    return [PackedRow(*(kind(cell) for kind, cell in zip(kinds, line, strict=True))) for line in lines]
-
-
-def means(rows: Sequence[PackedRow], by: Sequence[str], name: str) -> dict[tuple[Any, ...], Mean]:
-    """Return the mean of a measure over seeds, by the values of columns."""
-    groups: dict[tuple[Any, ...], list[float]] = {}
-    for one in rows:
-        groups.setdefault(tuple(getattr(one, key) for key in by), []).append(getattr(one, name))
-    return {key: Mean.of(values) for key, values in groups.items()}

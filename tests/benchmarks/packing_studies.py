@@ -17,7 +17,8 @@ from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.backend import runtime
 from tisim.cases.packing.comparisons import compared
 from tisim.cases.packing.figures import drawn, starts_of
-from tisim.cases.packing.studies import STUDIES, PackedRow, measured_packings, plan_of, plans, read, table
+from tisim.cases.packing.studies import measured_packings, plan_of, plans
+from tisim.cases.packing.study_table import STUDIES, PackedRow, read, table
 
 SIZE = "default"
 

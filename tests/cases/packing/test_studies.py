@@ -13,18 +13,8 @@ from tisim.cases.packing.figures import compared_bodies
 from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.scene import rod
 from tisim.cases.packing.snapshots import in_cylinders, in_wedges, wedge_directions
-from tisim.cases.packing.studies import (
-    STUDIES,
-    PackedPlan,
-    PackedRow,
-    means,
-    measured_packings,
-    packed,
-    plans,
-    read,
-    shortest,
-    table,
-)
+from tisim.cases.packing.studies import PackedPlan, measured_packings, packed, plans, shortest
+from tisim.cases.packing.study_table import STUDIES, PackedRow, means, read, table
 from tisim.geometry import WedgeContainer
 from tisim.shapes import SphereShape
 
