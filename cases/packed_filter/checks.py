@@ -14,12 +14,13 @@ from tisim.cases.packed_filter.measures import (
     SIZE_CLASSES,
     captured_by,
     captured_fraction,
+    has_left,
     missing,
     penetration,
     released_fraction,
     size_classes,
 )
-from tisim.cases.packed_filter.scene import MAGNETITE_SATURATION, PackedFilter, filter_of
+from tisim.cases.packed_filter.scene import MAGNETITE_SATURATION, PackedFilter, eluted, filter_of
 
 CHECK_STARTS = 6
 """Packings of each setting, each with its own colloids."""
@@ -39,6 +40,8 @@ def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
     still = filter_of("small", "static", duration=WAITS[-1], number=COLLOIDS)
     rested = runs(still, starts)
     yield from of_static(still, rested)
+    rinsed = [runs(eluted(wait, "small", number=COLLOIDS), starts) for wait in WAITS]
+    yield from of_elution(rinsed)
     slow, fast = stream(SLOW), stream(FAST)
     of_slow, of_fast = runs(slow, starts), runs(fast, starts)
     yield from of_dynamic(slow, of_slow, of_fast)
@@ -47,7 +50,8 @@ def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
     for name, results in zip(("slow", "4 times as fast"), of_own, strict=True):
         passing = Mean.of([penetration(one) for one in results])
         yield Shown(f"dynamic, {name}: passed, colloids of 2.95 nm at 1.5 T", passing)
-    lost = missing([*rested, *of_slow, *of_fast, *of_own[0], *of_own[1]])
+    every = [*rinsed, of_slow, of_fast, *of_own]
+    lost = missing([*rested, *(one for results in every for one in results)])
     yield Check("colloids that are neither out, captured nor free", float(lost), 0.0, 0.0)
 
 
@@ -85,9 +89,30 @@ def of_static(filter: PackedFilter, results: Sequence[Result]) -> Iterator[Claim
         yield Shown(f"static: free after {wait:g} s", free, f"single fibres: {alone}")
 
 
+def of_elution(rinsed: Sequence[Sequence[Result]]) -> Iterator[Claim | Shown]:
+    """B16 7.4.3: the water runs out with the field on. rinsed : results by waiting time."""
+    during = []
+    for wait, results in zip(WAITS, rinsed, strict=True):
+        rested, whole = (np.array([captured_fraction(one, at) for one in results]) for at in (wait, np.inf))
+        during.append(whole - rested)
+        yield Shown(f"elution after {wait:g} s: captured in all", Mean.of(whole), "B16: 0.5 to 0.6")
+        yield Shown(f"elution after {wait:g} s: captured during the elution", Mean.of(during[-1]))
+        radius = Mean.of([mean_magnetic_radius(one, has_left(one)) for one in results])
+        yield Shown(f"elution after {wait:g} s: mean radius of the eluted, nm", radius, "B16: about 3")
+    yield Claim(
+        f"elution: captured during it after {WAITS[0]:g} s minus after {WAITS[-1]:g} s",
+        Mean.of(during[0] - during[-1]), least=0.0,
+    )  # fmt: skip
+
+
 def free_radius(result: Result, time: float) -> float:
     """Return the mean magnetic radius of the colloids that are not captured by a time (s), nm."""
-    moment = result.state["saturation_moment"][~captured_by(result, time)]
+    return mean_magnetic_radius(result, ~captured_by(result, time))
+
+
+def mean_magnetic_radius(result: Result, which: np.ndarray) -> float:
+    """Return the mean magnetic radius of some of the colloids, nm."""
+    moment = result.state["saturation_moment"][which]
     return float(1e9 * np.cbrt(3 * moment / (4 * np.pi * MAGNETITE_SATURATION)).mean())
 
 

@@ -23,8 +23,9 @@ from scipy.spatial.transform import Rotation
 from tisim import Box, run
 from tisim.analysis import Mean
 from tisim.cases.common.runs import sound
+from tisim.cases.packed_filter.matrix import magnetised
 from tisim.cases.packed_filter.measures import SIZE_CLASSES, size_classes
-from tisim.cases.packed_filter.scene import PackedFilter, magnetised
+from tisim.cases.packed_filter.scene import PackedFilter
 from tisim.engine.batches import Progress
 from tisim.sources import Cylinder
 from tisim.sources.switched import NO_END

@@ -11,13 +11,15 @@ With ``tube``, rods are packed in a round tube in place of a cube, as in B16's s
 40 mm: 2 to 10 lengths of the fibres of 4 to 11 mm (section 7.3.2).
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 
 import numpy as np
 
-from tisim import run
+from tisim import Box, run
 from tisim.analysis import PackedBodies
 from tisim.cases.common.runs import sound
 from tisim.cases.packing.scene import packed_by
@@ -25,7 +27,8 @@ from tisim.components.component import Vector
 from tisim.errors import must
 from tisim.geometry import CylindricalContainer
 from tisim.shapes import SpherocylinderShape
-from tisim.sources import Cylinder
+from tisim.sources import Cylinder, magnetise
+from tisim.sources.magnetic import soft_magnet, stoner_wohlfarth
 from tisim.steppers import EnergyMinimisation
 
 LOOSE = 0.03
@@ -36,6 +39,12 @@ KEPT_MATRICES = 16
 """Matrices that are kept in memory, as each start of a design asks for its own again."""
 LONGEST_PACKING = 3e4
 """Largest number of evaluations of the forces of a packing, of 1 s each, s."""
+STEEL_SATURATION = 2.2e6
+"""Saturation magnetisation of the fibres, A/m (B16 section 7.3.4)."""
+IMAGE_REACH = 1.0
+"""Distance from the matrix up to which there are fibres, in lengths of a fibre."""
+CLEAR = 1.001
+"""Colloids start outside the fibres, enlarged by this factor."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +146,50 @@ class Matrix:
                 if (outside < reach).all():
                     images.append(body.model_copy(update={"centre": _vector(centre)}))
         return (*fibres, *images)
+
+
+@lru_cache(KEPT_MATRICES)
+def magnets_of(
+    matrix: Matrix, flux: Vector, bulk: bool, mutual: bool, saturated: bool
+) -> tuple[Cylinder, ...]:
+    """Return the magnetised fibres of a matrix in a field of a flux density (T), followed by their images.
+
+    bulk : whether there are images along the flow. mutual, saturated : see PackedFilter.
+    """
+    fibres = matrix.fibres()
+    every = matrix.with_images(fibres, IMAGE_REACH * matrix.length, bulk)
+    if mutual:
+        own = magnetise(every, flux, STEEL_SATURATION, None if saturated else math.inf)[: len(fibres)]
+    else:
+        own = tuple(magnetised(one, flux, saturated) for one in fibres)
+    # The outermost images lack neighbours; all images are magnetised as their fibres.
+    return matrix.with_images(own, IMAGE_REACH * matrix.length, bulk)
+
+
+def magnetised(body: Cylinder, flux: Vector, saturated: bool) -> Cylinder:
+    """Return a fibre of steel, which is soft or always saturated, alone in a field (T)."""
+    law = stoner_wohlfarth.magnetisation if saturated else soft_magnet.magnetisation
+    m = law(body.axis, body.radius, body.length, STEEL_SATURATION, flux)
+    return body.model_copy(update={"magnetisation": m})
+
+
+def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int, tube: bool = False) -> np.ndarray:
+    """Return random positions in a box, or in a tube along z in it, outside the fibres, m, shape
+    (number, 3)."""
+    generator = np.random.default_rng([seed, 0x904E5])
+    centre, axis = (np.array([getattr(one, name) for one in fibres]) for name in ("centre", "direction"))
+    radius, half = np.array([(one.radius, one.length / 2) for one in fibres]).T * CLEAR
+    found = np.empty((0, 3))
+    while len(found) < number:
+        tried = generator.uniform(box.low, box.high, (number, 3))
+        inside = np.hypot(tried[:, 0], tried[:, 1]) * CLEAR > box.high[0] if tube else np.zeros(number, bool)
+        for k in range(len(fibres)):
+            away = tried - centre[k]
+            along = away @ axis[k]
+            across = np.linalg.norm(away - along[:, None] * axis[k], axis=1)
+            inside |= (across < radius[k]) & (np.abs(along) < half[k])
+        found = np.concatenate([found, tried[~inside]])
+    return found[:number]
 
 
 @lru_cache(KEPT_MATRICES)

@@ -43,6 +43,11 @@ def captured_fraction(result: Result, time: float = np.inf) -> float:
     return float(captured_by(result, time)[inside(result)].mean())
 
 
+def has_left(result: Result) -> np.ndarray:
+    """Return which colloids have left through the outlet, shape (n,)."""
+    return np.asarray(result.state["exited_at"] >= 0)
+
+
 def penetration(result: Result, which: np.ndarray | None = None) -> float:
     """Return the fraction of the colloids, or of some of them, that are never captured: they have left, or
     are free at the end. It is 1 if none has entered."""

@@ -7,18 +7,18 @@ that touches a fibre is captured.
 "static" is B16's static separation: the colloids are spread at random in the pores, and nothing flows. The
 matrix and the positions of the colloids are periodic along all axes. "dynamic" is B16's dynamic separation: a
 suspension enters in front of the matrix, flows through it, and is counted behind it. The matrix is periodic
-across the flow, or is in a tube, whose wall reflects colloids. The field is the sum of the fields of all
-fibres within ``IMAGE_REACH`` of the matrix.
+across the flow, or is in a tube, whose wall reflects colloids. "elution" is static separation with its end:
+the colloids are spread in the pores and rest for a time, and then clear water rinses those that are free out
+of the matrix, with the field on. The field is the sum of the fields of all fibres within ``IMAGE_REACH`` of
+the matrix.
 
 B16 gives the field of about 1 and 1.5 T, the fibres, of 0.4 mm and 4, 7 and 11 mm, and the magnetic radius of
 the colloids. It does not give the solid fraction, the flow, or the hydrodynamic radius, which is here the
 magnetic one.
 """
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -28,7 +28,7 @@ from scipy.fft import next_fast_len
 from tisim import Box, Particles, Scene
 from tisim.cases.case import Size, size_named
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
-from tisim.cases.packed_filter.matrix import FLOW_DIRECTION, KEPT_MATRICES, Matrix
+from tisim.cases.packed_filter.matrix import FLOW_DIRECTION, Matrix, in_pores, magnets_of
 from tisim.components.component import Vector
 from tisim.effects import Effect, LangevinMoment, Magnetophoresis
 from tisim.geometry import CylindricalSurface, Plane
@@ -36,15 +36,12 @@ from tisim.operators import Capture, Inlet, Outlet, ReflectingWalls, Release
 from tisim.packing import GrainClass, LognormalSizes, MagneticCore
 from tisim.packing.grains import draw
 from tisim.packing.magnetic_core import core_normals
-from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow, UniformFlow, magnetise
-from tisim.sources.magnetic import soft_magnet, stoner_wohlfarth
+from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow, UniformFlow
 from tisim.sources.magnetic.cell_sum import Corners
 from tisim.sources.switched import NO_END
 from tisim.steppers import Brownian, DriftLimit
 
 TITLE = "Magnetic colloids captured in a packing of magnetised fibres (B16)"
-STEEL_SATURATION = 2.2e6
-"""Saturation magnetisation of the fibres, A/m (B16 section 7.3.4)."""
 MAGNETITE_SATURATION = 4.46e5
 """Saturation magnetisation of magnetite, A/m (B16 7.6)."""
 MAGNETITE_DENSITY = 5180.0
@@ -53,8 +50,6 @@ MEAN_RADIUS, POLYDISPERSITY = 5.1e-9, 0.40
 """Mean magnetic radius of the colloids, m, and their standard deviation over it (B16 section 7.4.1)."""
 SMALLEST_RADIUS, LARGEST_RADIUS = 1e-9, 20e-9
 """Radii of the smallest and largest colloids, m."""
-IMAGE_REACH = 1.0
-"""Distance from the matrix up to which there are fibres, in lengths of a fibre."""
 LONGEST_MOVE = 0.02
 """Largest displacement of a colloid in a step by forces, by the flow and by diffusion, D. Captures are found
 at the ends of steps: with 0.05, 3 % more colloids pass (docs/packed_filter.md)."""
@@ -65,11 +60,15 @@ APPROACH = 1.0
 ADHERING = 0.4
 """Fraction of captured colloids that are never released: B16 released at most 60 % (section 7.5)."""
 MATRIX_SETTINGS = tuple(one.name for one in fields(Matrix))
-CLEAR = 1.001
-"""Colloids start outside the fibres, enlarged by this factor."""
 TUBE = 2.0
 """Diameter of the tube of variant "tube" over the length of a rod with its caps."""
-Mode = Literal["static", "dynamic"]
+ELUTION_SPEED = 1e-3
+"""Superficial velocity of the water that rinses the matrix, m/s; B16 lets it run out (section 7.4.3)."""
+ELUTION_WAIT = 60.0
+"""Time of rest before the elution of variant "elution", s."""
+ELUTION_TRANSITS = 4.0
+"""Duration of the rinse, in times in which the water passes the filter."""
+Mode = Literal["static", "dynamic", "elution"]
 Flow = Literal["resolved", "uniform"]
 
 SEARCH: dict[str, Any] = {"options": {"population": 8, "first": 12}, "ensemble": {"confirm": 8}}
@@ -97,17 +96,18 @@ SIZES = {
 class PackedFilter:
     """A filter and the suspension in it.
 
-    matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the fibres
-    magnetise each other. saturated : whether the fibres are saturated in any field, in the direction of least
-    energy (Stoner and Wohlfarth), as in B16 chapter 6; otherwise they are soft steel. digits : of the sum of
-    their fields by cells; None to add the fibres one by one, from a table, which is faster for few colloids.
-    speed : superficial velocity of the water, the volume flow over the cross section of the column, m/s. flow
-    : "resolved" between the fibres, or "uniform" with the mean velocity in the pores. resolution : cells of
-    the resolved flow over D, unless ``cells`` along x, y and z are given. feed : time until which colloids
-    enter, s. field_end : time at which the field is switched off, s. adhering : fraction of captured colloids
-    that are never released; None for captures that last for ever. mean_radius, polydispersity : of the
-    colloids, m, and relative. number : of colloids. duration : of the run, s. longest_move : largest
-    displacement of a colloid in a step, D.
+    matrix : the fibres. mode : of the separation. flux : of the applied field, T. mutual : whether the
+    fibres magnetise each other. saturated : whether the fibres are saturated in any field, in the
+    direction of least energy (Stoner and Wohlfarth), as in B16 chapter 6; otherwise they are soft steel.
+    digits : of the sum of their fields by cells; None to add the fibres one by one, from a table, which
+    is faster for few colloids. speed : superficial velocity of the water, the volume flow over the cross
+    section of the column, m/s. flow : "resolved" between the fibres, or "uniform" with the mean velocity
+    in the pores. resolution : cells of the resolved flow over D, unless ``cells`` along x, y and z are
+    given. wait : time at which the flow of mode "elution" begins, s. feed : time until which colloids
+    enter in mode "dynamic", s. field_end : time at which the field is switched off, s. adhering :
+    fraction of captured colloids that are never released; None for captures that last for ever.
+    mean_radius, polydispersity : of the colloids, m, and relative. number : of colloids. duration : of
+    the run, s. longest_move : largest displacement of a colloid in a step, D.
     """
 
     matrix: Matrix = field(default_factory=Matrix)
@@ -120,6 +120,7 @@ class PackedFilter:
     flow: Flow = "resolved"
     resolution: float = 5.0
     cells: tuple[int, int, int] | None = None
+    wait: float = 0.0
     feed: float = 60.0
     field_end: float = NO_END
     adhering: float | None = None
@@ -138,6 +139,13 @@ class PackedFilter:
     def stage(self) -> float:
         """Return the time in which the water passes the mean distance of fibres, s."""
         return self.matrix.density ** (-1 / 3) / self.pore_speed
+
+    @property
+    def transit(self) -> float:
+        """Return the time in which the water passes the filter, from the place of the inlet to the outlet,
+        s."""
+        (_, _, first), (_, _, last) = self.stretch(self.box())
+        return (last - first) / self.pore_speed
 
     def with_packing(self, seed: int) -> Self:
         """Return the filter with the packing of a seed."""
@@ -162,7 +170,7 @@ class PackedFilter:
 
     def magnets(self) -> tuple[Cylinder, ...]:
         """Return the magnetised fibres of the matrix, followed by their images."""
-        return _magnets(self.matrix, self.field(), self.mode == "static", self.mutual, self.saturated)
+        return magnets_of(self.matrix, self.field(), self.mode == "static", self.mutual, self.saturated)
 
     def box(self) -> Box:
         """Return the box of the matrix."""
@@ -225,12 +233,14 @@ class PackedFilter:
         )
 
     def stream(self, fibres: tuple[Cylinder, ...], box: Box) -> tuple[Effect, ...]:
-        """Return the flow, and the faces before and behind a box at which colloids enter and leave."""
+        """Return the flow, and the faces before and behind a box at which colloids enter, if they do, and
+        leave."""
         if self.mode == "static":
             return ()
         (left, front, first), (right, back, last) = self.stretch(box)
         entry = first + self.matrix.diameter
-        flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed))
+        begin = self.wait if self.mode == "elution" else 0.0
+        flow: Effect = UniformFlow(velocity=(0.0, 0.0, self.pore_speed), begin=begin)
         if self.flow == "resolved":
             size = np.array([right - left, back - front, last - first]) / self.matrix.diameter
             x, y, z = self.cells or (next_fast_len(int(np.ceil(self.resolution * one))) for one in size)
@@ -244,20 +254,21 @@ class PackedFilter:
                 viscosity=WATER_VISCOSITY,
                 cylinders=fibres,
                 cells=(x, y, z),
+                begin=begin,
             )
-        return (
-            flow,
-            Inlet(
-                low=(left, front, first), high=(right, back, entry), direction=FLOW_DIRECTION, end=self.feed
-            ),
-            Outlet(planes=(Plane(point=(0.0, 0.0, last), normal=(0.0, 0.0, -1.0)),)),
+        outlet = Outlet(planes=(Plane(point=(0.0, 0.0, last), normal=(0.0, 0.0, -1.0)),))
+        if self.mode == "elution":
+            return flow, outlet
+        inlet = Inlet(
+            low=(left, front, first), high=(right, back, entry), direction=FLOW_DIRECTION, end=self.feed
         )
+        return flow, inlet, outlet
 
     def stretch(self, box: Box) -> Corners:
-        """Return the corners (m) of the box in which colloids are: the box of the matrix, from the beginning
-        of the inlet to the outlet if there is a flow."""
+        """Return the corners (m) of the box in which colloids are: the box of the matrix, from the place of
+        the inlet to the outlet if there is a flow."""
         (left, front, bottom), (right, back, top) = box.low, box.high
-        if self.mode == "dynamic":
+        if self.mode != "static":
             before = APPROACH * self.matrix.length
             bottom, top = bottom - before - self.matrix.diameter, top + before
         return (left, front, bottom), (right, back, top)
@@ -272,50 +283,12 @@ class PackedFilter:
         """Return the stepper, whose steps move a colloid by at most ``longest_move``."""
         move = self.longest_move * self.matrix.diameter
         diffusion = Boltzmann * WATER_TEMPERATURE / (6 * np.pi * WATER_VISCOSITY * self.mean_radius)
-        longest = min(move**2 / (2 * diffusion), move / self.pore_speed if self.mode == "dynamic" else np.inf)
+        longest = min(move**2 / (2 * diffusion), np.inf if self.mode == "static" else move / self.pore_speed)
         return Brownian(
             temperature=WATER_TEMPERATURE,
             viscosity=WATER_VISCOSITY,
             control=DriftLimit(longest=longest, shortest=1e-6, drift=move / self.mean_radius),
         )
-
-
-def in_pores(number: int, fibres: Sequence[Cylinder], box: Box, seed: int, tube: bool = False) -> np.ndarray:
-    """Return random positions in a box, or in a tube along z in it, outside the fibres, m, shape
-    (number, 3)."""
-    generator = np.random.default_rng([seed, 0x904E5])
-    centre, axis = (np.array([getattr(one, name) for one in fibres]) for name in ("centre", "direction"))
-    radius, half = np.array([(one.radius, one.length / 2) for one in fibres]).T * CLEAR
-    found = np.empty((0, 3))
-    while len(found) < number:
-        tried = generator.uniform(box.low, box.high, (number, 3))
-        inside = np.hypot(tried[:, 0], tried[:, 1]) * CLEAR > box.high[0] if tube else np.zeros(number, bool)
-        for k in range(len(fibres)):
-            away = tried - centre[k]
-            along = away @ axis[k]
-            across = np.linalg.norm(away - along[:, None] * axis[k], axis=1)
-            inside |= (across < radius[k]) & (np.abs(along) < half[k])
-        found = np.concatenate([found, tried[~inside]])
-    return found[:number]
-
-
-@lru_cache(KEPT_MATRICES)
-def _magnets(matrix: Matrix, flux: Vector, bulk: bool, mutual: bool, saturated: bool) -> tuple[Cylinder, ...]:
-    fibres = matrix.fibres()
-    every = matrix.with_images(fibres, IMAGE_REACH * matrix.length, bulk)
-    if mutual:
-        own = magnetise(every, flux, STEEL_SATURATION, None if saturated else math.inf)[: len(fibres)]
-    else:
-        own = tuple(magnetised(one, flux, saturated) for one in fibres)
-    # The outermost images lack neighbours; all images are magnetised as their fibres.
-    return matrix.with_images(own, IMAGE_REACH * matrix.length, bulk)
-
-
-def magnetised(body: Cylinder, flux: Vector, saturated: bool) -> Cylinder:
-    """Return a fibre of steel, which is soft or always saturated, alone in a field (T)."""
-    law = stoner_wohlfarth.magnetisation if saturated else soft_magnet.magnetisation
-    m = law(body.axis, body.radius, body.length, STEEL_SATURATION, flux)
-    return body.model_copy(update={"magnetisation": m})
 
 
 def filter_of(size: str, mode: Mode = "dynamic", seed: int = 0, **settings: Any) -> PackedFilter:
@@ -325,6 +298,8 @@ def filter_of(size: str, mode: Mode = "dynamic", seed: int = 0, **settings: Any)
     matrix = Matrix(**{name: wanted.pop(name) for name in MATRIX_SETTINGS if name in wanted})
     if mode == "static":
         wanted |= {"field_end": NO_END}
+    elif mode == "elution":
+        wanted = {"speed": ELUTION_SPEED, **wanted, "field_end": NO_END}
     else:
         wanted = {"adhering": ADHERING, **wanted}
     return PackedFilter(matrix, mode, **wanted)
@@ -350,9 +325,21 @@ def tube_scene(size: str, seed: int) -> Scene:
     return filter_of(size, seed=seed, tube=TUBE).scene(seed)
 
 
+def eluted(wait: float, size: str, seed: int = 0, **settings: Any) -> PackedFilter:
+    """Return static separation of a size that ends with an elution, after a wait (s); see ``filter_of``."""
+    filter = filter_of(size, "elution", seed, wait=wait, **settings)
+    return replace(filter, duration=wait + ELUTION_TRANSITS * filter.transit)
+
+
+def elution_scene(size: str, seed: int) -> Scene:
+    """Return static separation with its elution after a minute."""
+    return eluted(ELUTION_WAIT, size, seed).scene(seed)
+
+
 PACKED_FILTER_SCENES: Mapping[str, Callable[[str, int], Scene]] = {
     "dynamic": scene_for,
     "static": static_scene,
+    "elution": elution_scene,
     "uniform-flow": uniform_scene,
     "tube": tube_scene,
 }

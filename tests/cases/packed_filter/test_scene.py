@@ -7,15 +7,15 @@ import pytest
 
 from tisim import Simulation, run
 from tisim.analysis import particle_balance
-from tisim.cases.packed_filter.measures import captured_fraction, missing, penetration, released_fraction
-from tisim.cases.packed_filter.scene import (
-    MEAN_RADIUS,
-    POLYDISPERSITY,
-    filter_of,
-    in_pores,
-    magnetised,
-    scene_for,
+from tisim.cases.packed_filter.matrix import in_pores, magnetised
+from tisim.cases.packed_filter.measures import (
+    captured_fraction,
+    has_left,
+    missing,
+    penetration,
+    released_fraction,
 )
+from tisim.cases.packed_filter.scene import MEAN_RADIUS, POLYDISPERSITY, eluted, filter_of, scene_for
 from tisim.sources import MagneticCylinders, PoreFlow, sample
 
 pytestmark = pytest.mark.long
@@ -182,3 +182,38 @@ def test_colloids_stay_in_a_tube_with_its_flow():
         assert missing([result]) == 0
         assert result.work["captures"] > 5
         assert np.hypot(*result.state["position"][:, :2].T).max() < radius
+
+
+@pytest.fixture(scope="module")
+def rinsed():
+    """An elution in a uniform flow, in which all colloids leave within one transit."""
+    return eluted(5.0, "small", number=60, digits=None, flow="uniform")
+
+
+def test_the_flow_of_an_elution_begins_after_the_wait(rinsed):
+    scene = rinsed.scene(3)
+    flow = next(one for one in scene.effects if one.kind() == "uniform_flow")
+    assert flow.begin == 5.0
+    assert scene.duration > 5.0 + 3 * rinsed.matrix.depth / rinsed.pore_speed
+    assert "inlet" not in {one.kind() for one in scene.effects}
+    assert scene.domain.periodic == (True, True, False)
+    low, high = scene.domain.bounds()
+    start = scene.particles.arrays(scene.domain, 3)["position"]
+    assert (low <= start).all()
+    assert (start <= high).all()
+
+
+@pytest.mark.slow
+def test_an_elution_rinses_free_colloids_out(rinsed):
+    scene = rinsed.scene(3)
+    result = run(scene)
+    left, captured = has_left(result), result.state["captured_at"] >= 0
+    assert missing([result]) == 0
+    np.testing.assert_array_equal(left, ~captured)
+    assert left.sum() > 5
+    # The nearest to the outlet is a whole approach away from it; no colloid leaves without a flow.
+    assert result.state["exited_at"][left].min() > 5.0 + 0.9 * rinsed.matrix.length / rinsed.pore_speed
+    assert result.state["exited_at"][left].max() < 5.0 + 1.1 * rinsed.transit
+    # Water carries colloids against fibres.
+    assert (captured & (result.state["captured_at"] > 5.0)).sum() > 5
+    assert captured_fraction(result, 5.0) > 0.05
