@@ -1,5 +1,7 @@
 """tisim run: its files, its interruption and continuation, and its failures."""
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -145,3 +147,17 @@ def test_without_removes_an_effect_from_scene_and_kernels(tisim, impacts, tmp_pa
     assert not any(word in present for word in ("fragmentation", "cooling", "pieces", "fracture_energy"))
     assert "pieces (of fragmentation)" in left_out
     assert "cooling_loss (of cooling)" in left_out
+
+
+def test_a_run_that_ends_by_itself_shows_steps_and_measures(tisim, tmp_path, monkeypatch, press_ctrl_c):
+    """Nobody knows its end, so neither a percentage nor evenly spaced frames mean anything."""
+    command = ("run", "packing", "--size", "small", "--out", "packed")
+    code, _, err = tisim(*command, "--frames", "10")
+    assert code == 2
+    assert "--frames must be --every, as this run ends by itself" in " ".join(err.split())
+    assert not (tmp_path / "packed").exists()
+    press_ctrl_c(monkeypatch, after=2)
+    code, _, err = tisim(*command)
+    assert code == 130
+    assert re.search(r"stopped at step \d+, packing_fraction 0\.\d+", " ".join(err.split()))
+    assert "%" not in err

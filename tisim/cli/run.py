@@ -39,6 +39,7 @@ from tisim.errors import InputError, RunError, must
 from tisim.files import regular_file
 from tisim.files.output_folder import resume_hint
 from tisim.interrupt import Interrupt
+from tisim.state.fields import names_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,6 +65,8 @@ def run(
     name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or (), variant)
     out_folder = run_folder.RunFolder(folder or Path("out") / name)
     resume = out_folder.check(scene, fresh, overwrite)
+    rule = f"--every, as this run ends by itself long before its duration of {scene.duration:.3g} s"
+    must(frames is None or not scene.stepper.ends, "--frames", rule, frames)
     recording = recording_from_options(out_folder.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)
@@ -78,7 +81,7 @@ def run(
         try:
             with observer_context as recorder:
                 if resume:
-                    err().print(f"going on with {out_folder.checkpoint}, from {simulation.fraction():.1%}")
+                    err().print(f"going on with {out_folder.checkpoint}, from {_reached(simulation)}")
                 observers = [recorder, checkpoints] if recorder else [checkpoints]
                 finished = _advance(simulation, name, observers)
             paths = run_folder.write(simulation.results()[0], out_folder, _cloud) if finished else []
@@ -89,7 +92,7 @@ def run(
         if not finished:
             checkpoint.save(simulation, out_folder.checkpoint)
             err().print(
-                f"stopped at {simulation.fraction():.1%}; {out_folder.checkpoint} is written. "
+                f"stopped at {_reached(simulation)}; {out_folder.checkpoint} is written. "
                 f"{resume_hint(fresh, overwrite)}"
             )
             raise typer.Exit(130)
@@ -103,12 +106,16 @@ def run(
 def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -> bool:
     """Run to the end with a progress bar; return False if Ctrl-C has stopped the run between two steps."""
     with progress_bar("{task.description}") as bar, Interrupt(print_stopping) as ctrl_c:
-        task = bar.add_task(name, total=1.0)
+        open_ended = bool(simulation.scenes[0].stepper.ends)
+        task = bar.add_task(name, total=None if open_ended else 1.0)
 
         def report(simulation: Simulation) -> None:
-            description = f"{name}, {simulation.remaining_steps():.3g} steps to go"
-            # A failed run is not complete, so its simulated fraction is shown.
-            bar.update(task, completed=float(simulation.simulated()[0]), description=description)
+            if open_ended:
+                bar.update(task, description=f"{name}, {_reached(simulation)}")
+            else:
+                description = f"{name}, {simulation.remaining_steps():.3g} steps to go"
+                # A failed run is not complete, so its simulated fraction is shown.
+                bar.update(task, completed=float(simulation.simulated()[0]), description=description)
             ctrl_c.check()
 
         try:
@@ -118,6 +125,18 @@ def _advance(simulation: Simulation, name: str, observers: Sequence[Observer]) -
                 raise
             return False
     return True
+
+
+def _reached(simulation: Simulation) -> str:
+    """Return how far a run has come: the simulated part of its duration, or the steps and the measures of a
+    stepper that ends the run by itself."""
+    stepper = simulation.scenes[0].stepper
+    if not stepper.ends:
+        return f"{simulation.fraction():.1%}"
+    now = simulation.s.snapshot(("steps", *names_of(stepper.world_fields, "measure")))
+    steps = int(now.pop("steps")[0])
+    measures = [f"{name} {float(value[0]):.4g}" for name, value in now.items()] if steps else []
+    return ", ".join((f"step {steps}", *measures))
 
 
 def _restore(simulation: Simulation, path: Path) -> None:

@@ -126,7 +126,8 @@ class Frames:
         reached, end = float(self.times[-1]) if len(self) else 0.0, self.scene.duration
         if reached >= end * (1 - TIME_ROUNDING) or reached == self._ended_at():
             return ""
-        return f"the run has come to t = {reached:.6g} s of {end:.6g} s; what follows is missing"
+        of_end = "" if self.scene.stepper.ends else f" of {end:.6g} s"
+        return f"the run has come to t = {reached:.6g} s{of_end}; what follows is missing"
 
     def _ended_at(self) -> float:
         """Return the time (s) of a result.h5 whose run has ended, or of the one beside a trajectory; NaN if

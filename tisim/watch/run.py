@@ -48,8 +48,10 @@ class _Opened:
 
 
 def _reached(sequence: Frames) -> str:
-    reached, end = float(sequence.times[-1]), sequence.scene.duration
-    return f"The run has come to t = {reached:.6g} s of {end:.6g} s."
+    reached, scene = float(sequence.times[-1]), sequence.scene
+    # A stepper that ends the run by itself does so long before the duration.
+    end = "" if scene.stepper.ends else f" of {scene.duration:.6g} s"
+    return f"The run has come to t = {reached:.6g} s{end}."
 
 
 class WatchedRun(Watched):
