@@ -11,7 +11,7 @@ from tisim.analysis import Mean
 from tisim.analysis.packings.orientational_order import random_nematic_order, random_order
 from tisim.cases.packing.scene import rod
 from tisim.cases.packing.studies import shortest
-from tisim.cases.packing.study_table import PackedRow, Study, means
+from tisim.cases.packing.study_table import PackedRow, Study, means, text
 
 CONTACTS_OF_RODS = 10.0
 """Contact number of the random contact equation phi L/D = <C>/2 = 5 for thin rods."""
@@ -62,11 +62,6 @@ def shortest_fraction(aspect: float, angle: float) -> float:
     return 2 * rod(aspect).volume() / shortest(aspect, angle) ** 2 / tangent
 
 
-def text(one: Mean) -> str:
-    """Return a mean with its interval, or the only number that there is."""
-    return str(one) if math.isfinite(one.half) else f"{one.value:.3g} (one start)"
-
-
 def compared(study: Study, rows: Sequence[PackedRow], free: Sequence[PackedRow] = ()) -> list[Compared]:
     """Return the lines of a study. free : rods in a periodic box, beside which others are scaled."""
     made: Mapping[Study, Any] = {
@@ -101,7 +96,7 @@ def of_rods(rows: Sequence[PackedRow]) -> Iterator[Compared]:
     here = f"{largest.nematic:.3f} of {largest.number} rods; {at_random:.3f} at random"
     yield Compared("largest S", "below 0.08 of 500 rods", here)
     aspects = [shape for shape in old if chosen(rows, shape=shape, method="revised")]
-    for name, what in (("fraction", "packing fraction"), ("contacts", "contact number")):
+    for name, what in (("fraction", "packing fraction"), ("touching", "contact number up to 1e-4 D")):
         for aspect in dict.fromkeys([*aspects[:1], *aspects[-1:]]):
             pair = [of(chosen(rows, shape=aspect, method=method), name) for method in ("revised", "original")]
             subject = f"{what}, revised minus original, Lambda = {aspect:g}"
@@ -178,7 +173,8 @@ def of_wedges(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterator[
         }
         last = [one for one in some if one.width == longest[one.angle]]
         published = "about one half" if aspect <= 2 else "above 0.8"
-        yield Compared(f"f_align, longest wedges, {who}", published, text(of(last, "aligned")))
+        here = f"{text(of(last, 'aligned'))}; along any wall {text(of(last, 'with_any'))}"
+        yield Compared(f"f_align, longest wedges, {who}", published, here)
         for angle in sorted(longest):
             at = chosen(last, angle=angle)
             star = scaled(of(at, "fraction"), full["fraction"], shortest_fraction(aspect, angle))
@@ -225,13 +221,14 @@ def of_effort(rows: Sequence[PackedRow]) -> Iterator[Compared]:
 
 def of_wedge_effort(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterator[Compared]:
     columns = ("shape", "angle", "width", "number", "limit")
-    by = {name: means(rows, columns, name) for name in ("aligned", "fraction", "contacts")}
+    by = {name: means(rows, columns, name) for name in ("aligned", "with_any", "fraction", "contacts")}
     for key, aligned in by["aligned"].items():
         aspect, angle, width, number, limit = key
         length = width / shortest(aspect, angle)
         subject = f"Lambda {aspect:g}, {angle:g} degrees, {length:.2g} l_min, {number} rods, {limit} attempts"
         fraction, contacts = text(by["fraction"][key]), text(by["contacts"][key])
-        here = f"f_align {text(aligned)}, packing fraction {fraction}, contacts {contacts}"
+        here = f"f_align {text(aligned)}, along any wall {text(by['with_any'][key])}"
+        here += f", packing fraction {fraction}, contacts {contacts}"
         if chosen(free, shape=aspect, method="original"):
             full, low = periodic(free, aspect), shortest_fraction(aspect, angle)
             star = scaled(by["fraction"][key], full["fraction"], low)

@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from tisim.analysis.packings.packed_bodies import PackedBodies
-from tisim.analysis.packings.wall_alignment import direction_histogram
+from tisim.analysis.packings.wall_alignment import DirectionHistogram, direction_histogram
 from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.studies import container_of, shortest
 from tisim.cases.packing.study_table import PackedRow
@@ -108,17 +108,34 @@ def of_superballs(packings: Sequence[Packing]) -> Figure:
     return snapshots(some, lambda row: rf"$\gamma$ = {row.shape:g}", len(some), 2.4, 3.2)
 
 
-def wedge_directions(packings: Sequence[Packing]) -> Figure:
-    """Draw the directions of rods in acute wedges, of all seeds together (B16 Fig. 2.15)."""
+def in_acute_wedges(packings: Sequence[Packing]) -> dict[str, DirectionHistogram]:
+    """Return the distribution of the directions of rods in acute wedges of each length, of all seeds
+    together."""
     axes: dict[float, list[np.ndarray]] = {}
     for row, bodies in packings:
         if row.shape == LONG and row.angle == ACUTE:
             axes.setdefault(row.width, []).append(bodies.axes()[:, 2])
-    return directions(
-        {
-            f"{width / shortest(LONG, ACUTE):.2g} $l_{{w,min}}$": direction_histogram(
-                np.concatenate(axes[width]), DIRECTION_BINS
-            )
-            for width in sorted(axes)
-        }
-    )
+    return {
+        f"{width / shortest(LONG, ACUTE):.2g} $l_{{w,min}}$": direction_histogram(
+            np.concatenate(axes[width]), DIRECTION_BINS
+        )
+        for width in sorted(axes)
+    }
+
+
+def wedge_directions(packings: Sequence[Packing]) -> Figure:
+    """Draw the directions of rods in acute wedges (B16 Fig. 2.15)."""
+    return directions(in_acute_wedges(packings))
+
+
+def direction_shares(packings: Sequence[Packing]) -> list[str]:
+    """Return a line for acute wedges of each length: the shares of the rods along the bottom or the slope, at
+    azimuths up to 13.5 degrees, along the back, from 76.5 degrees on, and along the edge, at cosines above
+    7/8; and these shares of random directions."""
+    lines = []
+    for name, found in in_acute_wedges(packings).items():
+        share = found.density / found.density.size
+        shares = {"bottom or slope": share[:, :3], "back": share[:, -3:], "edge": share[-1:, :]}
+        each = [f"{where} {part.sum():.3f} ({part.size / share.size:.3f})" for where, part in shares.items()]
+        lines.append(f"directions, {name}: {', '.join(each)}")
+    return lines

@@ -138,7 +138,7 @@ def container_of(one: PackedPlan | PackedRow) -> containers.Container | None:
     return None
 
 
-MEASURES = ("fraction", "contacts", "touching", "held", "nematic", "cubatic")
+OF_PACKING = ("fraction", "contacts", "touching", "held", "nematic", "cubatic")
 """Columns that are measures of the packing by itself."""
 
 
@@ -249,18 +249,21 @@ def given(plan: PackedPlan, options: Mapping[str, Any], seed: int) -> dict[str, 
 
 def row(plan: PackedPlan, known: Mapping[str, Any], one: MeasuredPacking) -> PackedRow:
     """Return the line of a packing."""
-    measures = {name: getattr(one, name) for name in MEASURES}
-    return PackedRow(**known, **measures, attempts=one.attempts, aligned=aligned(plan, one))
+    measures = {name: getattr(one, name) for name in OF_PACKING}
+    aligned, with_any = near_walls(plan, one)
+    return PackedRow(**known, **measures, attempts=one.attempts, aligned=aligned, with_any=with_any)
 
 
-def aligned(plan: PackedPlan, one: MeasuredPacking) -> float:
-    """Return the part of the bodies near walls that are aligned with them; NaN without walls."""
+def near_walls(plan: PackedPlan, one: MeasuredPacking) -> tuple[float, float]:
+    """Return f_align of B16, and the part of the bodies near walls that lie along at least one; NaN without
+    walls."""
     around = plan.container()
     if around is None:
-        return float("nan")
+        return float("nan"), float("nan")
     side, unit = one.bodies.high - one.bodies.low, float(one.bodies.diameters()[0])
     distance, normal = around.distances(one.bodies.position - one.bodies.low, side, unit)
-    return wall_alignment(one.bodies, distance, normal).fraction
+    found = wall_alignment(one.bodies, distance, normal)
+    return found.fraction, found.with_any
 
 
 def plan_of(one: PackedRow) -> PackedPlan:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from typing import Any, Literal, get_args
@@ -30,7 +31,8 @@ class PackedRow:
     """A packing of a study: a line of its table, which begins with what is known before it is packed.
 
     Lengths are in D; an angle is in degrees; NaN where it does not apply. step : first step of the volume, in
-    volumes of a body. limit : attempts for a contraction. attempts : of the whole run.
+    volumes of a body. limit : attempts for a contraction. attempts : of the whole run. aligned, with_any :
+    f_align of B16, and the part of the bodies near walls that lie along at least one.
     """
 
     study: str
@@ -53,6 +55,7 @@ class PackedRow:
     nematic: float
     cubatic: float
     aligned: float
+    with_any: float
 
     def key(self) -> tuple[str, ...]:
         """Return the columns that identify the packing."""
@@ -67,6 +70,13 @@ class PackedRow:
 
 IDENTITY = tuple(one.name for one in fields(PackedRow)[:12])
 """Columns that are known before a packing is made."""
+
+
+MEASURES = (
+    *("fraction", "contacts", "touching", "held", "nematic", "cubatic", "aligned", "with_any"),
+    "attempts",
+)
+"""Columns of measures."""
 
 
 def key_of(known: Mapping[str, Any]) -> tuple[str, ...]:
@@ -86,6 +96,30 @@ def read(text: str) -> list[PackedRow]:
     kinds = [types[getattr(one.type, "__name__", str(one.type))] for one in fields(PackedRow)]
     lines = list(csv.reader(io.StringIO(text)))[1:]
     return [PackedRow(*(kind(cell) for kind, cell in zip(kinds, line, strict=True))) for line in lines]
+
+
+def summary(rows: Sequence[PackedRow]) -> list[list[str]]:
+    """Return the means of all measures over seeds with their 95 % intervals, a line for each packing, below a
+    line of headings. Columns that are the same in all rows, or that do not apply, are left out."""
+    settings = [
+        name for name in IDENTITY[:-1]
+        if len({key_of({**vars(one)})[IDENTITY.index(name)] for one in rows}) > 1
+    ]  # fmt: skip
+    groups: dict[tuple[str, ...], list[PackedRow]] = {}
+    for one in sorted(rows, key=PackedRow.place):
+        groups.setdefault(one.key()[:-1], []).append(one)
+    measures = [name for name in MEASURES if any(np.isfinite(getattr(one, name)) for one in rows)]
+    lines = [[*settings, "starts", *measures]]
+    for key, some in groups.items():
+        known = dict(zip(IDENTITY, key, strict=False))
+        found = [text(Mean.of([getattr(one, name) for one in some])) for name in measures]
+        lines.append([*(known[name] for name in settings), str(len(some)), *found])
+    return lines
+
+
+def text(one: Mean) -> str:
+    """Return a mean with its interval, or the only number that there is."""
+    return str(one) if math.isfinite(one.half) else f"{one.value:.3g} (one start)"
 
 
 def means(rows: Sequence[PackedRow], by: Sequence[str], name: str) -> dict[tuple[Any, ...], Mean]:

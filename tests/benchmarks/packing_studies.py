@@ -17,8 +17,9 @@ from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.backend import runtime
 from tisim.cases.packing.comparisons import compared
 from tisim.cases.packing.figures import drawn, starts_of
+from tisim.cases.packing.snapshots import direction_shares
 from tisim.cases.packing.studies import measured_packings, plan_of, plans
-from tisim.cases.packing.study_table import STUDIES, PackedRow, read, table
+from tisim.cases.packing.study_table import STUDIES, PackedRow, read, summary, table
 
 SIZE = "default"
 
@@ -80,7 +81,13 @@ def main():
     free = [row for row, _ in made.get("aspect ratio", [])]
     for study, some in made.items():
         print(f"\n{study}: {len(some)} packings")
-        for line in compared(study, sorted((row for row, _ in some), key=PackedRow.place), free):
+        rows = sorted((row for row, _ in some), key=PackedRow.place)
+        for cells in summary(rows):
+            print("|", " | ".join(cells), "|")
+        print()
+        for line in compared(study, rows, free):
+            print(line)
+        for line in direction_shares(some) if study == "wedge" else ():
             print(line)
     for name, figure in drawn(made).items():
         figure.savefig(place / name, dpi=80)
