@@ -27,13 +27,22 @@ def sections(table: str) -> tuple[str, dict[str, str]]:
     return about.strip(), {one.partition("\n")[0]: one.partition("\n")[2].strip() for one in families}
 
 
+def counted(section: str) -> str:
+    """The numbers of cases and of measured numbers of a section."""
+    rows = [line for line in section.splitlines() if line.startswith("| ")][1:]
+    cases = sum(line.startswith("| **") for line in rows)
+    return f"{cases} cases, {len(rows) - cases} numbers"
+
+
 def joined(old: str, new: str, titles: list[str]) -> str:
     """The table of a page with the sections of a run in place of its own, in the order of the titles."""
     about, found = sections(old)
     of_run, measured = sections(new)
     if list(measured) == titles:
         return new.strip()
-    found |= {title: f"{of_run}\n\n{section}" for title, section in measured.items()}
+    found |= {
+        title: f"{counted(section)}, of a run of {of_run}\n\n{section}" for title, section in measured.items()
+    }
     return "\n\n".join([about, *(f"### {title}\n\n{found[title]}" for title in titles if title in found)])
 
 

@@ -14,7 +14,7 @@ from tisim.analysis import head_to_tail, labels
 from tisim.cases.common.csv_tables import csv_text
 from tisim.cases.concentration import scene as concentration
 from tisim.cases.concentration.scene import coupling
-from tisim.cases.concentration.statistics import CAPTURE, chain, held_fraction
+from tisim.cases.concentration.statistics import CAPTURE, chain, held_fraction, touched_fraction
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames, frames
 from tisim.plotting.cloud import directions, panel
@@ -32,16 +32,20 @@ CURVE_DURATION = 0.6
 """The simulated time that curves span, s."""
 CURVE_REPEATS, CURVE_FRAMES = 2, 90
 """Number of repeats averaged for a curve, and number of its points."""
+HELD, TOUCHED = "captured or in a chain that is", "captured"
+"""Names of the two curves of captured particles."""
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """chains.png: the particles at the end, and mean chain length and captured fraction over time."""
+    """chains.png: the particles at the end, the mean chain length over time, and the captured fraction over
+    time if any are captured."""
     every = list(trajectory)
     last = every[-1].arrays
     if "moment" not in last:
         return {}
-    figure = empty(10.4, 4.6)
-    left, right = figure.subplots(1, 2)
+    captured = bool((last["captured_at"] >= 0).any())
+    figure = empty(14.4 if captured else 10.4, 4.6)
+    left, right, *beside = figure.subplots(1, 3 if captured else 2)
     snapshot(left, last)
     times = 1e3 * trajectory.times
     moment = last["moment"]
@@ -49,7 +53,14 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
     right.set(xlabel="time (ms)", ylabel="mean number of particles of a chain", ylim=(0, None))
     plain(right)
     left.set_title(f"after {times[-1]:.3g} ms, coloured by chain; grey: single")
-    letters((left, right))
+    for axis in beside:
+        states = [frame.arrays for frame in every]
+        axis.plot(times, [held_fraction(one) for one in states], color="#4477aa", label=HELD)
+        axis.plot(times, [touched_fraction(one) for one in states], color="#4477aa", ls=":", label=TOUCHED)
+        axis.set(xlabel="time (ms)", ylabel="fraction of the particles", ylim=(0, 1.02))
+        axis.legend(frameon=False, fontsize=9)
+        plain(axis)
+    letters((left, right, *beside))
     return {"chains.png": figure}
 
 
@@ -100,7 +111,7 @@ def captured(progress: Progress) -> Curves:
             for world in range(k * CURVE_REPEATS, (k + 1) * CURVE_REPEATS):
                 with frames(path, world) as trajectory:
                     every = [frame.arrays for frame in trajectory]
-                    touched.append([float((state["captured_at"] >= 0).mean()) for state in every])
+                    touched.append([touched_fraction(state) for state in every])
                     hanging.append([held_fraction(state) for state in every])
                     times = trajectory.times
             curves[key] = (times, np.mean(touched, axis=0), np.mean(hanging, axis=0))
@@ -115,8 +126,8 @@ def captured_figure(curves: Curves) -> Figure:
         for c, colour in zip(CONCENTRATIONS, ("#cc6677", "#4477aa", "#228833"), strict=True):
             times, touched, hanging = curves[angle, c]
             name = f"{1e3 * c:g} mg/mL"
-            axis.plot(times, hanging, color=colour, lw=1.5, label=f"{name}, captured or in a chain that is")
-            axis.plot(times, touched, color=colour, lw=1.0, ls=":", label=f"{name}, captured")
+            axis.plot(times, hanging, color=colour, lw=1.5, label=f"{name}, {HELD}")
+            axis.plot(times, touched, color=colour, lw=1.0, ls=":", label=f"{name}, {TOUCHED}")
         axis.set(xlabel="time (s)", ylim=(0, 1.02), title=f"axis at {angle:.0f}° to the field")
         plain(axis)
     axes[0].set_ylabel(f"fraction of the particles,\nmean of {CURVE_REPEATS} starts")

@@ -63,6 +63,11 @@ def held_fraction(state: Arrays) -> float:
     return float(np.isin(cluster, cluster[state["fixed"] > 0]).mean())
 
 
+def touched_fraction(state: Arrays) -> float:
+    """Return the fraction of the particles that are captured."""
+    return float((state["captured_at"] >= 0).mean())
+
+
 def first(result: Result) -> float:
     """Return the time at which the first particle was captured, s; RunError if none was."""
     at = result.state["captured_at"]

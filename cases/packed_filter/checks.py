@@ -1,13 +1,16 @@
 """Checks of packed_filter: what B16 expects of the matrix, and what single fibres predict for it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.constants import Boltzmann, mu_0
 
 from tisim import Result
 from tisim.analysis import Mean
 from tisim.cases.case import Check, Claim, Shown
+from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.common.runs import grouped
 from tisim.cases.packed_filter.lone_fibre import lone_fibres
 from tisim.cases.packed_filter.measures import (
@@ -17,10 +20,17 @@ from tisim.cases.packed_filter.measures import (
     has_left,
     missing,
     penetration,
+    penetration_of_layers,
     released_fraction,
     size_classes,
 )
-from tisim.cases.packed_filter.scene import MAGNETITE_SATURATION, PackedFilter, eluted, filter_of
+from tisim.cases.packed_filter.scene import (
+    MAGNETITE_DENSITY,
+    MAGNETITE_SATURATION,
+    PackedFilter,
+    eluted,
+    filter_of,
+)
 
 CHECK_STARTS = 6
 """Packings of each setting, each with its own colloids."""
@@ -30,29 +40,89 @@ WAITS = (10.0, 60.0, 180.0)
 """Waiting times of static separation, s (B16 section 7.4.3)."""
 SLOW, FAST = 1e-4, 4e-4
 """Superficial velocities of dynamic separation, of B16's ratio of 4 (section 7.4.2), m/s."""
+CASCADE_COLLOIDS = 4000
+"""Colloids around each fibre of the cascade, of which few are captured in a stage."""
+OTHERS: dict[str, dict[str, Any]] = {
+    "in a uniform flow": {"flow": "uniform"},
+    "without mutual magnetisation": {"mutual": False},
+    "of saturated fibres": {"saturated": True},
+    "captured wherever they touch": {"adhering": None},
+    "with steps of 0.05 D": {"longest_move": 0.05},
+    "with steps of 0.01 D": {"longest_move": 0.01},
+    "with 3 cells over D": {"resolution": 3.0},
+    "with 3 digits of the field": {"digits": 3},
+}
+"""Settings of the dynamic separation that are compared with the usual ones."""
+SMALL_RADII = (2e-9, 1e-9)
+"""Magnetic radii of colloids that fibres hardly hold, m."""
+MANY = 100_000
+"""Colloids of a distribution."""
+WEIGHT_FRACTION, WATER_DENSITY = 5e-5, 1000.0
+"""Fraction of magnetite in B16's suspension by weight (section 7.4.3), and the density of water, kg/m^3."""
 COLLOIDS = 400
 OWN_COLLOIDS: dict[str, Any] = {"mean_radius": 2.95e-9, "polydispersity": 0.475, "flux": 1.5}
 """Colloids that B16 synthesised, and the field, of the dynamic separation (sections 7.4.1, 7.4.2)."""
 
 
+Runs = Callable[[PackedFilter], list[Result]]
+"""Results of a filter in several packings."""
+
+
 def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
     """Run static and dynamic separation in six packings each."""
+    every: list[Result] = []
+
+    def made(filter: PackedFilter) -> list[Result]:
+        results = runs(filter, starts)
+        every.extend(results)
+        return results
+
+    yield from of_colloids(filter_of("small"))
     still = filter_of("small", "static", duration=WAITS[-1], number=COLLOIDS)
-    rested = runs(still, starts)
-    yield from of_static(still, rested)
-    rinsed = [runs(eluted(wait, "small", number=COLLOIDS), starts) for wait in WAITS]
-    yield from of_elution(rinsed)
-    slow, fast = stream(SLOW), stream(FAST)
-    of_slow, of_fast = runs(slow, starts), runs(fast, starts)
-    yield from of_dynamic(slow, of_slow, of_fast)
-    yield from of_fibres(slow, of_slow, starts)
-    of_own = [runs(stream(speed, **OWN_COLLOIDS), starts) for speed in (SLOW, FAST)]
-    for name, results in zip(("slow", "4 times as fast"), of_own, strict=True):
-        passing = Mean.of([penetration(one) for one in results])
-        yield Shown(f"dynamic, {name}: passed, colloids of 2.95 nm at 1.5 T", passing)
-    every = [*rinsed, of_slow, of_fast, *of_own]
-    lost = missing([*rested, *(one for results in every for one in results)])
-    yield Check("colloids that are neither out, captured nor free", float(lost), 0.0, 0.0)
+    yield from of_static(still, made(still))
+    yield from of_elution([made(eluted(wait, "small", number=COLLOIDS)) for wait in WAITS])
+    slow = stream(SLOW)
+    of_slow = made(slow)
+    yield from of_dynamic(slow, of_slow, made(stream(FAST)))
+    for speed, name in ((SLOW, "slow"), (FAST, "4 times as fast")):
+        yield from passed(f"{name}: colloids of 2.95 nm at 1.5 T", made(stream(speed, **OWN_COLLOIDS)))
+    yield from of_fibres(slow, of_slow)
+    yield from of_others(of_slow, made)
+    yield Check("colloids that are neither out, captured nor free", float(missing(every)), 0.0, 0.0)
+
+
+def of_colloids(filter: PackedFilter) -> Iterator[Shown]:
+    """Energies and encounters of colloids, in closed form."""
+    energy = Boltzmann * WATER_TEMPERATURE
+    for radius in (filter.mean_radius, *SMALL_RADII):
+        name = f"energy m B / kT of a colloid of {1e9 * radius:.3g} nm in {filter.flux:g} T"
+        yield Shown(name, float(moment_of(radius) * filter.flux / energy), "held by the fibre if far above 1")
+    own = replace(filter, **{name: OWN_COLLOIDS[name] for name in ("mean_radius", "polydispersity")})
+    for one in (filter, own):
+        part = float((one.radii(MANY, 0) < SMALL_RADII[0]).mean())
+        mean, least = 1e9 * one.mean_radius, 1e9 * SMALL_RADII[0]
+        name = f"part of colloids of mean radius {mean:.3g} nm that are below {least:g} nm"
+        yield Shown(name, part)
+    for times in (1, 2):
+        radius = times * filter.mean_radius
+        coupling = mu_0 * moment_of(radius) ** 2 / (2 * np.pi * (2 * radius) ** 3) / energy
+        name = f"coupling Gamma of two colloids of {1e9 * radius:.3g} nm in contact"
+        yield Shown(name, float(coupling), "B16 (6.25); chains if far above 1")
+    # The mean of the cubes of lognormal radii.
+    volume = 4 / 3 * np.pi * filter.mean_radius**3 * (1 + filter.polydispersity**2) ** 3
+    number = WEIGHT_FRACTION * WATER_DENSITY / (MAGNETITE_DENSITY * volume)
+    rate = 8 * energy / (3 * WATER_VISCOSITY) * number
+    yield Shown(
+        "time in which a colloid of B16's suspension meets another, s", 1 / rate, "Smoluchowski (1917)"
+    )
+    box = filter.box()
+    here = filter.number / float(np.prod(np.subtract(box.high, box.low)))
+    yield Shown("mean distance of colloids here over B16's", float(np.cbrt(number / here)))
+
+
+def moment_of(radius: float) -> float:
+    """Return the magnetic moment of a colloid of a magnetic radius (m), A m^2."""
+    return MAGNETITE_SATURATION * 4 / 3 * np.pi * radius**3
 
 
 def stream(speed: float, size: str = "small", **settings: Any) -> PackedFilter:
@@ -78,6 +148,10 @@ def of_static(filter: PackedFilter, results: Sequence[Result]) -> Iterator[Claim
     for wait in WAITS:
         name = f"static: mean radius of the free after {wait:g} s, nm"
         yield Shown(name, Mean.of(size[wait]), "B16: about 3")
+    for wait in (0.0, *WAITS):
+        width = [free_width(one, wait) for one in results]
+        name = f"static: standard deviation of the radius of the free over its mean, after {wait:g} s"
+        yield Shown(name, Mean.of(width), "B16: falls")
     yield Claim(
         "static: mean radius of the free after 180 s over the start", Mean.of(size[WAITS[-1]] / size[0.0]),
         most=1.0,
@@ -97,7 +171,7 @@ def of_elution(rinsed: Sequence[Sequence[Result]]) -> Iterator[Claim | Shown]:
         during.append(whole - rested)
         yield Shown(f"elution after {wait:g} s: captured in all", Mean.of(whole), "B16: 0.5 to 0.6")
         yield Shown(f"elution after {wait:g} s: captured during the elution", Mean.of(during[-1]))
-        radius = Mean.of([mean_magnetic_radius(one, has_left(one)) for one in results])
+        radius = Mean.of([float(magnetic_radii(one, has_left(one)).mean()) for one in results])
         yield Shown(f"elution after {wait:g} s: mean radius of the eluted, nm", radius, "B16: about 3")
     yield Claim(
         f"elution: captured during it after {WAITS[0]:g} s minus after {WAITS[-1]:g} s",
@@ -107,13 +181,20 @@ def of_elution(rinsed: Sequence[Sequence[Result]]) -> Iterator[Claim | Shown]:
 
 def free_radius(result: Result, time: float) -> float:
     """Return the mean magnetic radius of the colloids that are not captured by a time (s), nm."""
-    return mean_magnetic_radius(result, ~captured_by(result, time))
+    return float(magnetic_radii(result, ~captured_by(result, time)).mean())
 
 
-def mean_magnetic_radius(result: Result, which: np.ndarray) -> float:
-    """Return the mean magnetic radius of some of the colloids, nm."""
+def free_width(result: Result, time: float) -> float:
+    """Return the standard deviation of the magnetic radii of the colloids that are not captured by a time
+    (s), over their mean."""
+    radii = magnetic_radii(result, ~captured_by(result, time))
+    return float(radii.std() / radii.mean())
+
+
+def magnetic_radii(result: Result, which: np.ndarray) -> np.ndarray:
+    """Return the magnetic radii of some of the colloids, nm."""
     moment = result.state["saturation_moment"][which]
-    return float(1e9 * np.cbrt(3 * moment / (4 * np.pi * MAGNETITE_SATURATION)).mean())
+    return np.asarray(1e9 * np.cbrt(3 * moment / (4 * np.pi * MAGNETITE_SATURATION)))
 
 
 def of_dynamic(
@@ -121,41 +202,45 @@ def of_dynamic(
 ) -> Iterator[Claim | Shown]:
     """B16 7.4.2: a flow four times as slow loses (nearly) no colloids; at most 60 % are released."""
     depth = 1e3 * filter.matrix.depth
+    yield from passed(f"slow, {depth:.2g} mm", slow, "B16, in 280 mm: (nearly) none")
+    yield from passed(f"4 times as fast, {depth:.2g} mm", fast, "B16, in 280 mm: some")
     passing = [np.array([penetration(one) for one in some]) for some in (slow, fast)]
-    published = ("slow", "B16, in 280 mm: (nearly) none"), ("4 times as fast", "B16, in 280 mm: some")
-    for (name, expected), some, results in zip(published, passing, (slow, fast), strict=True):
-        yield Shown(f"dynamic, {name}: passed in {depth:.2g} mm", Mean.of(some), expected)
-        for kind, size in ((0, "smallest"), (SIZE_CLASSES - 1, "largest")):
-            of_size = [penetration(one, size_classes(one.state["radius"]) == kind) for one in results]
-            name_of = f"dynamic, {name}: passed in {depth:.2g} mm, {size} sixth"
-            yield Shown(name_of, Mean.of(of_size))
     yield Claim("dynamic: passed, fast minus slow", Mean.of(passing[1] - passing[0]), least=0.0)
     freed = Mean.of([released_fraction(one) for one in slow])
     yield Claim("dynamic: released after the field is switched off", freed, 0.4, 0.7)
 
 
-def of_fibres(filter: PackedFilter, results: Sequence[Result], starts: int) -> Iterator[Claim | Shown]:
-    """The matrix beside single fibres, the cascade, a uniform flow, fibres that do not magnetise each
-    other, and other steps."""
-    passing = np.array([penetration(one) for one in results])
+def passed(name: str, results: Sequence[Result], published: str = "") -> Iterator[Shown]:
+    """Show the fraction of the colloids that pass, of all, the smallest and the largest, and the sizes of
+    those that pass."""
+    yield Shown(f"dynamic, {name}: passed", Mean.of([penetration(one) for one in results]), published)
+    for kind, size in ((0, "smallest"), (SIZE_CLASSES - 1, "largest")):
+        of_size = [penetration(one, size_classes(one.state["radius"]) == kind) for one in results]
+        yield Shown(f"dynamic, {name}: passed, {size} sixth", Mean.of(of_size))
+    radius = [float(magnetic_radii(one, one.state["capture_count"] == 0).mean()) for one in results]
+    yield Shown(f"dynamic, {name}: mean radius of the passed, nm", Mean.of(radius))
+
+
+def of_fibres(filter: PackedFilter, results: Sequence[Result]) -> Iterator[Shown]:
+    """The matrix beside single fibres and the cascade."""
+    passing = Mean.of([penetration(one) for one in results])
     matrix, lone = filter.matrix, lone_fibres(filter, LONE_FIBRES)
-    yield Shown(
-        "passed, matrix",
-        Mean.of(passing),
-        f"single fibres: {lone.passed(np.inf, matrix.density * matrix.depth)}",
-    )
-    still = lone_fibres(filter_of("small", "static", duration=filter.stage, number=COLLOIDS), LONE_FIBRES)
+    alone = lone.passed(np.inf, matrix.density * matrix.depth)
+    yield Shown("passed, matrix", passing, f"single fibres: {alone}")
+    still = filter_of("small", "static", duration=filter.stage, number=CASCADE_COLLOIDS)
     stages = matrix.depth * matrix.density ** (1 / 3)
-    yield Shown(
-        "passed, matrix", Mean.of(passing), f"cascade: {still.passed(np.inf, matrix.density, stages)}"
-    )
-    others: tuple[tuple[str, dict[str, Any]], ...] = (
-        ("in a uniform flow", {"flow": "uniform"}),
-        ("without mutual magnetisation", {"mutual": False}),
-        ("of saturated fibres", {"saturated": True}),
-        ("with steps of 0.05 D", {"longest_move": 0.05}),
-        ("with steps of 0.01 D", {"longest_move": 0.01}),
-    )
-    for name, setting in others:
-        other = np.array([penetration(one) for one in runs(stream(SLOW, **setting), starts)])
+    cascade = lone_fibres(still, LONE_FIBRES).passed(np.inf, matrix.density, stages)
+    yield Shown("passed, matrix", passing, f"cascade: {cascade}")
+
+
+def of_others(results: Sequence[Result], made: Runs) -> Iterator[Shown]:
+    """The matrix beside other models of it, and beside two layers of it."""
+    passing = np.array([penetration(one) for one in results])
+    for name, setting in OTHERS.items():
+        other = np.array([penetration(one) for one in made(stream(SLOW, **setting))])
         yield Shown(f"passed, {name}, minus matrix", Mean.of(other - passing))
+    for layers in (2, 4):
+        extrapolated = np.array([penetration_of_layers(one, layers) for one in results])
+        twice = np.array([penetration(one) for one in made(stream(SLOW, layers=layers))])
+        yield Shown(f"passed, {layers} layers", Mean.of(twice), f"from one: {Mean.of(extrapolated)}")
+        yield Shown(f"passed, {layers} layers, minus extrapolated from one", Mean.of(twice - extrapolated))

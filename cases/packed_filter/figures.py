@@ -11,7 +11,16 @@ from matplotlib.figure import Figure
 from tisim import Result
 from tisim.analysis import Mean, breakthrough_curve, captured_by_size
 from tisim.cases.common.csv_tables import csv_text
-from tisim.cases.packed_filter.checks import FAST, LONE_FIBRES, SLOW, WAITS, free_radius, runs, stream
+from tisim.cases.packed_filter.checks import (
+    CASCADE_COLLOIDS,
+    FAST,
+    LONE_FIBRES,
+    SLOW,
+    WAITS,
+    free_radius,
+    runs,
+    stream,
+)
 from tisim.cases.packed_filter.lone_fibre import lone_fibres
 from tisim.cases.packed_filter.measures import captured_by, captured_fraction, penetration
 from tisim.cases.packed_filter.pictures import caught
@@ -125,7 +134,7 @@ def beside(size: str, progress: Progress) -> list[tuple[float, str, Mean]]:
         rows.append(
             (speed, "single fibres", lone_fibres(filter, LONE_FIBRES).passed(np.inf, n * matrix.depth))
         )
-        still = filter_of(size, "static", duration=filter.stage, number=filter.number)
+        still = filter_of(size, "static", duration=filter.stage, number=CASCADE_COLLOIDS)
         rows.append((speed, "cascade", lone_fibres(still, LONE_FIBRES).passed(np.inf, n, stages)))
         progress((k + 1) / len(SPEEDS))
     return rows

@@ -117,10 +117,22 @@ def missing(results: Sequence[Result]) -> int:
     return max(abs(particle_balance(one.work, one.state).missing) for one in results)
 
 
+def pore_flow(result: Result) -> PoreFlow:
+    """Return the resolved flow of a run."""
+    return next(one for one in result.scene.effects if isinstance(one, PoreFlow))
+
+
+def superficial_velocity(result: Result) -> float:
+    """Return the mean velocity of the resolved flow over the cross section of the column, m/s."""
+    speed = pore_flow(result).speed
+    assert speed is not None
+    return speed
+
+
 def pressure_drop(result: Result) -> float:
     """Return the pressure that drives the resolved flow through the matrix and the clear water around it,
     Pa."""
-    flow = next(one for one in result.scene.effects if isinstance(one, PoreFlow))
+    flow = pore_flow(result)
     assert flow.speed is not None
     return flow.viscosity * flow.speed / flow.solve().permeability * (flow.high[2] - flow.low[2])
 

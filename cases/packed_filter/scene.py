@@ -164,6 +164,10 @@ class PackedFilter:
         core = MagneticCore(magnetisation=MAGNETITE_SATURATION)
         return GrainClass(sizes=sizes, density=MAGNETITE_DENSITY, core=core)
 
+    def radii(self, number: int, seed: int) -> np.ndarray:
+        """Return the magnetic radii of a number of colloids, m."""
+        return draw([self.grains()], number, seed)[1]
+
     def field(self) -> Vector:
         """Return the flux density of the applied field, T."""
         return self.flux, 0.0, 0.0
@@ -200,7 +204,7 @@ class PackedFilter:
         """Return the scene of other fibres in another box. magnets : the fibres and their images."""
         core = self.grains().core
         assert core is not None
-        _, radius = draw([self.grains()], self.number, seed)
+        radius = self.radii(self.number, seed)
         moments = core.moments(radius, core_normals(self.number, seed))["saturation_moment"]
         return Scene(
             name="packed_filter",

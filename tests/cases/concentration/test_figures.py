@@ -27,10 +27,11 @@ def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
     class FewFrames(list):
         times = np.array([0.0, 1e-3])
 
-    def frame(position):
+    def frame(position, captured=0):
         moment = np.tile([1.0, 0.0, 0.0], (5, 1))
-        arrays = {"position": position, "radius": np.full(5, 7.5e-8), "moment": moment}
-        return SimpleNamespace(arrays=arrays)
+        at = np.where(np.arange(5) < captured, 1e-3, -1.0)
+        arrays = {"position": position, "radius": np.full(5, 7.5e-8), "moment": moment, "captured_at": at}
+        return SimpleNamespace(arrays={**arrays, "fixed": (at >= 0).astype(int)})
 
     pairs = 1.5e-7 * np.array([[0, 0, 0], [1, 0, 0], [0, 0, 9], [1, 0, 9], [4, 9, 0.0]])
     trajectory = FewFrames([frame(10 * pairs), frame(pairs)])
@@ -47,3 +48,9 @@ def test_picture_of_a_run_shows_chains_in_colour_and_their_mean_length():
     assert np.ptp(seen[4, :3]) < 0.02
     assert np.ptp(seen[:4, :3], axis=1).min() > 0.1
     assert np.abs(seen[0] - seen[2]).max() > 0.2
+    # One is captured and holds its neighbour.
+    trajectory[1] = frame(pairs, captured=1)
+    _, _, captured = figures.pictures(trajectory)["chains.png"].axes
+    held, touched = (line.get_ydata() for line in captured.lines)
+    np.testing.assert_allclose(held, [0.0, 0.4])
+    np.testing.assert_allclose(touched, [0.0, 0.2])
