@@ -210,13 +210,17 @@ def of_dynamic(
     yield Claim("dynamic: released after the field is switched off", freed, 0.4, 0.7)
 
 
-def passed(name: str, results: Sequence[Result], published: str = "") -> Iterator[Shown]:
+def passed(name: str, results: Sequence[Result], published: str = "") -> Iterator[Claim | Shown]:
     """Show the fraction of the colloids that pass, of all, the smallest and the largest, and the sizes of
     those that pass."""
     yield Shown(f"dynamic, {name}: passed", Mean.of([penetration(one) for one in results]), published)
+    of_size = {}
     for kind, size in ((0, "smallest"), (SIZE_CLASSES - 1, "largest")):
-        of_size = [penetration(one, size_classes(one.state["radius"]) == kind) for one in results]
-        yield Shown(f"dynamic, {name}: passed, {size} sixth", Mean.of(of_size))
+        some = [penetration(one, size_classes(one.state["radius"]) == kind) for one in results]
+        of_size[size] = np.array(some)
+        yield Shown(f"dynamic, {name}: passed, {size} sixth", Mean.of(some))
+    more = Mean.of(of_size["smallest"] - of_size["largest"])
+    yield Claim(f"dynamic, {name}: passed, smallest minus largest sixth", more, least=0.0)
     radius = [float(magnetic_radii(one, one.state["capture_count"] == 0).mean()) for one in results]
     yield Shown(f"dynamic, {name}: mean radius of the passed, nm", Mean.of(radius))
 

@@ -3,6 +3,7 @@
 import pytest
 
 from tisim import Recording, run
+from tisim.cases.packing import CASE
 from tisim.cases.packing.figures import pictures
 from tisim.cases.packing.measures import measured
 from tisim.cases.packing.scene import mixed, of_shape, rod
@@ -49,3 +50,9 @@ def test_the_pictures_of_a_run(tmp_path):
     (drawn,) = start.images
     assert 0.1 < drawn.get_array()[..., 3].mean() < 0.9
     assert start.get_title(loc="left").startswith("(a) start, t = 0 s: 40 bodies, mean bounding radius 1 m")
+
+
+@pytest.mark.slow
+def test_the_claims_hold():
+    for one in CASE.check():
+        assert one.ok is not False, (one.name, *one.cells)
