@@ -225,9 +225,18 @@ def test_a_run_that_ends_before_it_is_jammed_returns_a_configuration_without_ove
 
 
 @pytest.mark.slow
-def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
-    scenes = [scene(ROD, 100 + k, 0.1, seed=k, duration=60.0, method="original") for k in range(3)]
-    same_bits(scenes, tmp_path, 17)
+@pytest.mark.parametrize(
+    ("shape", "number", "options"),
+    [
+        (ROD, 100, {"method": "original"}),
+        (ROD, 100, {"method": "revised", "motion": 0.5}),
+        (CUBOID, 40, {"method": "revised", "motion": 0.5}),
+    ],
+)
+def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path, shape, number, options):
+    scenes = [scene(shape, number + k, 0.05, seed=k, duration=90.0, **options) for k in range(3)]
+    results = same_bits(scenes, tmp_path, 17)
+    assert min(one.work["contractions"] for one in results) > 0
 
 
 def test_other_effects_and_domains_are_refused():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.steppers.packing.bits import same_bits
 from tests.steppers.packing.test_mechanical_contraction import (
     CUBOID,
     ELLIPSOID,
@@ -146,3 +147,10 @@ def test_curved_walls_are_refused():
     stepper = MechanicalContraction(method="revised")
     with pytest.raises(InputError, match="rods or spheres in a cylindrical_container, as round ends touch"):
         mixed(40, 0.1, stepper, walls, periodic=(False, False, True))
+
+
+@pytest.mark.slow
+def test_the_bits_do_not_depend_on_batch_portions_or_checkpoint(tmp_path):
+    stepper = MechanicalContraction(**REVISED)
+    scenes = [mixed(48 + 4 * k, 0.1, stepper, duration=60.0) for k in range(3)]
+    same_bits(scenes, tmp_path, 17)
