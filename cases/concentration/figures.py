@@ -37,22 +37,23 @@ HELD, TOUCHED = "captured or in a chain that is", "captured"
 
 
 def pictures(trajectory: Frames) -> Mapping[str, Figure]:
-    """chains.png: the particles at the end, the mean chain length over time, and the captured fraction over
-    time if any are captured."""
+    """chains.png: the particles at the end, or in the last frame before the first is captured; the mean chain
+    length over time; and the captured fraction over time if any are captured."""
     every = list(trajectory)
     last = every[-1].arrays
     if "moment" not in last:
         return {}
-    captured = bool((last["captured_at"] >= 0).any())
+    captured = touched_fraction(last) > 0
+    free = max(k for k, frame in enumerate(every) if k == 0 or touched_fraction(frame.arrays) == 0)
     figure = empty(14.4 if captured else 10.4, 4.6)
     left, right, *beside = figure.subplots(1, 3 if captured else 2)
-    snapshot(left, last)
+    snapshot(left, every[free].arrays)
     times = 1e3 * trajectory.times
     moment = last["moment"]
     right.plot(times, [chain(frame.arrays, moment) for frame in every], color="#4477aa")
     right.set(xlabel="time (ms)", ylabel="mean number of particles of a chain", ylim=(0, None))
     plain(right)
-    left.set_title(f"after {times[-1]:.3g} ms, coloured by chain; grey: single")
+    left.set_title(f"after {times[free]:.3g} ms, coloured by chain; grey: single")
     for axis in beside:
         states = [frame.arrays for frame in every]
         axis.plot(times, [held_fraction(one) for one in states], color="#4477aa", label=HELD)

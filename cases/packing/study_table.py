@@ -112,7 +112,9 @@ def summary(rows: Sequence[PackedRow]) -> list[list[str]]:
     lines = [[*settings, "starts", *measures]]
     for key, some in groups.items():
         known = dict(zip(IDENTITY, key, strict=False))
-        found = [text(Mean.of([getattr(one, name) for one in some])) for name in measures]
+        values = [[getattr(one, name) for one in some] for name in measures]
+        # If all bodies are rattlers, no mean over the others exists.
+        found = [text(Mean.of(of)) if np.isfinite(of).all() else "-" for of in values]
         lines.append([*(known[name] for name in settings), str(len(some)), *found])
     return lines
 

@@ -217,6 +217,8 @@ def test_the_summary_has_the_means_of_each_packing_and_the_settings_that_vary():
     head, only = summary([row("aspect ratio", 1.5, aligned=np.nan, with_any=np.nan)])
     assert head == ["starts", *measures[:-2], "attempts"]
     assert only[:2] == ["1", "0.6 (one start)"]
+    # A mean over no bodies is not a number.
+    assert summary([row("aspect ratio", 1.0, held=np.nan), row("aspect ratio", 1.0, 1)])[1][4] == "-"
 
 
 def test_shares_of_directions_in_a_wedge():
