@@ -12,7 +12,7 @@ from tisim.analysis import Mean
 from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.common.runs import grouped
-from tisim.cases.packed_filter.lone_fibre import lone_fibres
+from tisim.cases.packed_filter.lone_fibre import LONE_RESOLUTION, lone_fibres
 from tisim.cases.packed_filter.measures import (
     SIZE_CLASSES,
     captured_by,
@@ -49,7 +49,8 @@ OTHERS: dict[str, dict[str, Any]] = {
     "captured wherever they touch": {"adhering": None},
     "with steps of 0.05 D": {"longest_move": 0.05},
     "with steps of 0.01 D": {"longest_move": 0.01},
-    "with 3 cells over D": {"resolution": 3.0},
+    "with 5 cells over D": {"resolution": 5.0},
+    "with 12 cells over D": {"resolution": 12.0},
     "with 3 digits of the field": {"digits": 3},
 }
 """Settings of the dynamic separation that are compared with the usual ones."""
@@ -86,7 +87,8 @@ def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
     yield from of_dynamic(slow, of_slow, made(stream(FAST)))
     for speed, name in ((SLOW, "slow"), (FAST, "4 times as fast")):
         yield from passed(f"{name}: colloids of 2.95 nm at 1.5 T", made(stream(speed, **OWN_COLLOIDS)))
-    yield from of_fibres(slow, of_slow)
+    coarse = replace(slow, resolution=LONE_RESOLUTION)
+    yield from of_fibres(coarse, made(coarse))
     yield from of_others(of_slow, made)
     yield Check("colloids that are neither out, captured nor free", float(missing(every)), 0.0, 0.0)
 
@@ -226,15 +228,16 @@ def passed(name: str, results: Sequence[Result], published: str = "") -> Iterato
 
 
 def of_fibres(filter: PackedFilter, results: Sequence[Result]) -> Iterator[Shown]:
-    """The matrix beside single fibres and the cascade."""
+    """The matrix beside single fibres, in flows of the same resolution, and beside the cascade."""
     passing = Mean.of([penetration(one) for one in results])
     matrix, lone = filter.matrix, lone_fibres(filter, LONE_FIBRES)
     alone = lone.passed(np.inf, matrix.density * matrix.depth)
-    yield Shown("passed, matrix", passing, f"single fibres: {alone}")
+    name = f"passed, matrix with {LONE_RESOLUTION:g} cells over D"
+    yield Shown(name, passing, f"single fibres: {alone}")
     still = filter_of("small", "static", duration=filter.stage, number=CASCADE_COLLOIDS)
     stages = matrix.depth * matrix.density ** (1 / 3)
     cascade = lone_fibres(still, LONE_FIBRES).passed(np.inf, matrix.density, stages)
-    yield Shown("passed, matrix", passing, f"cascade: {cascade}")
+    yield Shown(name, passing, f"cascade: {cascade}")
 
 
 def of_others(results: Sequence[Result], made: Runs) -> Iterator[Shown]:

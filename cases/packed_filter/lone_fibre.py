@@ -32,8 +32,8 @@ from tisim.sources.switched import NO_END
 
 START_MARGIN = 5.0
 """Distance from the fibre within which colloids start, D. Fibres attract them from less than that."""
-LONE_RESOLUTION = 3.0
-"""Largest number of cells over D of the flow around a lone fibre."""
+LONE_RESOLUTION = 5.0
+"""Cells over D of the flow around a lone fibre in checks and figures, and of the matrix beside it."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,11 @@ def _without(whole: range) -> list[np.ndarray]:
 def lone_fibres(
     filter: PackedFilter, fibres: int, seed: int = 0, progress: Progress | None = None
 ) -> LoneFibre:
-    """Run lone fibres in random directions with the settings of a filter; RunError if a run fails."""
+    """Run lone fibres in random directions with the settings of a filter; RunError if a run fails.
+
+    The flow around a lone fibre has the resolution of the filter. If a matrix is to be compared with it, its
+    flow needs the same: a coarse flow brings too many colloids to fibres.
+    """
     axes = Rotation.random(fibres, rng=np.random.default_rng([seed, 0x10E])).apply([0.0, 0.0, 1.0])
     matrix = filter.matrix
     # One box for all directions, so that all are worlds of one batch.
@@ -93,14 +97,12 @@ def lone_fibres(
     own = np.pi / 4 * matrix.diameter**2 * matrix.length
     size = 8 * half**3 - own if filter.mode == "static" else 4 * half**2
     # The field remains on, as a released colloid would count as one that was never captured.
-    coarse = replace(
-        filter, resolution=min(filter.resolution, LONE_RESOLUTION), adhering=None, field_end=NO_END
-    )
+    lasting = replace(filter, adhering=None, field_end=NO_END)
     scenes = []
     for k, axis in enumerate(axes):
         body = Cylinder(axis=tuple(axis.tolist()), radius=matrix.diameter / 2, length=matrix.length)
         scenes.append(
-            coarse.scene_about((body,), (magnetised(body, filter.field(), filter.saturated),), box, seed + k)
+            lasting.scene_about((body,), (magnetised(body, filter.field(), filter.saturated),), box, seed + k)
         )
     results = sound(run(scenes, progress))
     radius, at = (np.array([result.state[name] for result in results]) for name in ("radius", "captured_at"))

@@ -72,12 +72,12 @@ MEANINGS = {
     "speed": "superficial velocity of the water",
 }
 SEARCHED: dict[str, dict[str, Any]] = {
-    "small": {"number": 100, "resolution": 3.0, "digits": None},
-    "default": {"number": 300, "resolution": 4.5},
+    "small": {"number": 100, "resolution": 5.0, "digits": None},
+    "default": {"number": 300, "resolution": 8.0},
 }
 """Colloids of a run, least number of cells of its flow over D and the sum of its field, by size. An octree
 for each design does not pay for some hundred colloids."""
-FLOW_GRIDS = ((24, 24, 48), (36, 36, 72), (48, 48, 96), (60, 60, 120))
+FLOW_GRIDS = ((36, 36, 72), (48, 48, 96), (64, 64, 128), (100, 100, 200))
 """Grids of the flow. A design has the coarsest one with ``resolution``; designs of one grid can be run as one
 batch."""
 MORE_COLLOIDS = {"pressure": 1, "throughput": 1, "select": 4}

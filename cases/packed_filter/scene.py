@@ -118,7 +118,7 @@ class PackedFilter:
     digits: int | None = FIELD_DIGITS
     speed: float = 1e-4
     flow: Flow = "resolved"
-    resolution: float = 5.0
+    resolution: float = 8.0
     cells: tuple[int, int, int] | None = None
     wait: float = 0.0
     feed: float = 60.0
