@@ -160,7 +160,7 @@ def test_lone_fibres_hold_what_they_have_captured(monkeypatch):
 
 
 def test_designs_have_enough_fibres_and_cells():
-    """Each has at least three cells over the diameter of a fibre, and the coarsest grid of those."""
+    """Each has at least five cells over the diameter of a fibre, and the coarsest grid of those."""
     low = {"diameter": 0.8e-3, "aspect": 1.5, "fraction": 0.05, "flux": 0.1}
     high = {"diameter": 0.2e-3, "aspect": 5.0, "fraction": 0.35, "flux": 1.5}
     first, second = (problem.designed(one, 0, **problem.SEARCHED["small"]) for one in (low, high))
@@ -168,7 +168,7 @@ def test_designs_have_enough_fibres_and_cells():
     assert first.number == second.number
     for one in (first, second):
         low_corner, high_corner = one.stretch(one.box())
-        least = 3.0 * (np.array(high_corner) - low_corner) / one.matrix.diameter
+        least = 5.0 * (np.array(high_corner) - low_corner) / one.matrix.diameter
         assert (np.array(one.cells) >= least).all()
         coarser = problem.FLOW_GRIDS[: problem.FLOW_GRIDS.index(one.cells)]
         assert not any((np.array(other) >= least).all() for other in coarser)
