@@ -12,7 +12,7 @@ from tisim.analysis import Mean
 from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.common.runs import grouped
-from tisim.cases.packed_filter.lone_fibre import LONE_RESOLUTION, lone_fibres
+from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION, lone_fibres
 from tisim.cases.packed_filter.measures import (
     SIZE_CLASSES,
     captured_by,
@@ -87,7 +87,7 @@ def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
     yield from of_dynamic(slow, of_slow, made(stream(FAST)))
     for speed, name in ((SLOW, "slow"), (FAST, "4 times as fast")):
         yield from passed(f"{name}: colloids of 2.95 nm at 1.5 T", made(stream(speed, **OWN_COLLOIDS)))
-    coarse = replace(slow, resolution=LONE_RESOLUTION)
+    coarse = replace(slow, resolution=COMPARED_RESOLUTION)
     yield from of_fibres(coarse, made(coarse))
     yield from of_others(of_slow, made)
     yield Check("colloids that are neither out, captured nor free", float(missing(every)), 0.0, 0.0)
@@ -232,7 +232,7 @@ def of_fibres(filter: PackedFilter, results: Sequence[Result]) -> Iterator[Shown
     passing = Mean.of([penetration(one) for one in results])
     matrix, lone = filter.matrix, lone_fibres(filter, LONE_FIBRES)
     alone = lone.passed(np.inf, matrix.density * matrix.depth)
-    name = f"passed, matrix with {LONE_RESOLUTION:g} cells over D"
+    name = f"passed, matrix with {COMPARED_RESOLUTION:g} cells over D"
     yield Shown(name, passing, f"single fibres: {alone}")
     still = filter_of("small", "static", duration=filter.stage, number=CASCADE_COLLOIDS)
     stages = matrix.depth * matrix.density ** (1 / 3)

@@ -21,7 +21,7 @@ from tisim.cases.packed_filter.checks import (
     runs,
     stream,
 )
-from tisim.cases.packed_filter.lone_fibre import LONE_RESOLUTION, lone_fibres
+from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION, lone_fibres
 from tisim.cases.packed_filter.measures import captured_by, captured_fraction, penetration
 from tisim.cases.packed_filter.pictures import caught
 from tisim.cases.packed_filter.scene import Flow, filter_of
@@ -124,7 +124,7 @@ def beside(size: str, progress: Progress) -> list[tuple[float, str, Mean]]:
     """Return the penetration of matrix, single fibres, cascade and matrix in a uniform flow, by speed."""
     rows = []
     for k, speed in enumerate(SPEEDS):
-        filter = stream(speed, size, resolution=LONE_RESOLUTION)
+        filter = stream(speed, size, resolution=COMPARED_RESOLUTION)
         matrix = filter.matrix
         flows: tuple[tuple[Flow, str], ...] = (("resolved", "matrix"), ("uniform", "matrix, uniform flow"))
         for flow, name in flows:

@@ -32,8 +32,8 @@ from tisim.sources.switched import NO_END
 
 START_MARGIN = 5.0
 """Distance from the fibre within which colloids start, D. Fibres attract them from less than that."""
-LONE_RESOLUTION = 5.0
-"""Cells over D of the flow around a lone fibre in checks and figures, and of the matrix beside it."""
+COMPARED_RESOLUTION = 5.0
+"""Cells over D of the flow where a matrix is compared with lone fibres, and where many are compared."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tisim.analysis import Mean
 from tisim.backend.processor import processor
 from tisim.cases.packed_filter.checks import COLLOIDS, SLOW, WAITS, runs, stream
+from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION
 from tisim.cases.packed_filter.measures import (
     ANGLE_CLASSES,
     captured_fraction,
@@ -46,7 +47,7 @@ def static_line(aspect: float, packings: int) -> str:
 
 def dynamic_line(aspect: float, packings: int) -> str:
     """The line of dynamic separation."""
-    filter = stream(SLOW, aspect=aspect)
+    filter = stream(SLOW, aspect=aspect, resolution=COMPARED_RESOLUTION)
     results = runs(filter, packings)
     assert missing(results) == 0
     layers = DEPTH / filter.matrix.depth

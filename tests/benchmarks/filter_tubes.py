@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tisim.analysis import Mean
 from tisim.cases.packed_filter.checks import SLOW, runs, stream
+from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION
 from tisim.cases.packed_filter.measures import missing, penetration, penetration_of_layers, pressure_drop
 from tisim.cases.packed_filter.problem import DEPTH
 
@@ -30,7 +31,7 @@ def main() -> None:
     options = parser.parse_args()
     print(f"{'tube':>8} {'fibres':>6}  {'passed':18} {'captured in 10 mm':18} Pa in 10 mm")
     for tube in (None, *options.tubes):
-        filter = stream(SLOW, tube=tube)
+        filter = stream(SLOW, tube=tube, resolution=COMPARED_RESOLUTION)
         results = runs(filter, options.packings)
         assert missing(results) == 0
         passed = Mean.of([penetration(one) for one in results])
