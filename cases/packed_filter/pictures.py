@@ -31,12 +31,14 @@ STEEL, WATER = (0.82, 0.83, 0.85), (0.35, 0.62, 0.85)
 
 
 def pictures(frames: Frames) -> Mapping[str, Figure]:
-    """filter.png: the fibres, the streamlines and the captured colloids, and the course of the run."""
-    last = frames[-1]
+    """filter.png: the fibres, the streamlines and the captured colloids in the last frame in which most are
+    captured, and the course of the run."""
+    every = list(frames)
+    most = max(every, key=lambda frame: (int((frame.arrays["captured_by"] >= 0).sum()), frame.time))
     figure = empty(9.8, 5.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
-    draw_filter(figure, left, frames.scene, last.arrays, last.time)
-    course(right, [frame.arrays for frame in frames], np.asarray(frames.times))
+    draw_filter(figure, left, frames.scene, most.arrays, most.time)
+    course(right, [frame.arrays for frame in every], np.asarray(frames.times))
     letters((left, right))
     return {"filter.png": figure}
 
@@ -83,7 +85,7 @@ def draw_filter(
         ),
     )  # fmt: skip
     draw_solids(axis, solids)
-    axis.set_title(f"{held.sum()} of {len(held)} colloids are captured", fontsize=10)
+    axis.set_title(f"{held.sum()} of {len(held)} colloids are captured at {end:.3g} s", fontsize=10)
     figure.colorbar(ScalarMappable(norm, TIME), ax=axis, shrink=0.6, label="time of capture (s)")
 
 

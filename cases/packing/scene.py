@@ -46,7 +46,7 @@ SIZES = {
         {"generations": 20, "max_evaluations": 200, **SEARCH_SETTINGS},
     ),
     "paper": Size(
-        "500 bodies from a packing fraction of 0.05, 100,000 attempts, as B16",
+        "500 bodies from a packing fraction of 0.05, 100,000 attempts, for spheres as in B16 chapter 2",
         {"number": 500, "start": 0.05, "step": PUBLISHED_STEP, "attempts": 100_000},
     ),
 }

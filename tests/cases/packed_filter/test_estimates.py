@@ -8,7 +8,7 @@ import pytest
 
 from tisim import Box, InputError
 from tisim.analysis import Mean
-from tisim.cases.packed_filter import figures, problem
+from tisim.cases.packed_filter import figures, pictures, problem
 from tisim.cases.packed_filter.lone_fibre import LoneFibre, lone_fibres
 from tisim.cases.packed_filter.matrix import Matrix
 from tisim.cases.packed_filter.measures import (
@@ -197,3 +197,25 @@ def test_sizes_give_the_settings_of_matrix_and_filter():
     assert (made.flux, made.number, made.mode) == (0.5, 200, "dynamic")
     assert made.with_packing(7).matrix == replace(made.matrix, seed=7)
     assert filter_of("small", "static").adhering is None
+
+
+def test_the_picture_shows_captures_before_the_field_is_switched_off(monkeypatch):
+    class FewFrames(list):
+        times = np.array([0.0, 10.0, 20.0, 30.0])
+        scene = None
+
+    def frame(time, captured, out):
+        where = np.arange(5)
+        captured_by = np.where(where < captured, 0, -1)
+        exited = np.where(where >= 5 - out, 1.0, -1.0)
+        arrays = {"mass": np.ones(5), "captured_by": captured_by, "exited_at": exited}
+        return SimpleNamespace(time=time, arrays=arrays)
+
+    drawn = []
+    monkeypatch.setattr(pictures, "draw_filter", lambda *given: drawn.append(given[-1]))
+    looks = FewFrames(frame(*given) for given in ((0.0, 0, 0), (10.0, 3, 0), (20.0, 3, 1), (30.0, 1, 4)))
+    figure = pictures.pictures(looks)["filter.png"]
+    assert drawn == [20.0]
+    lines = {line.get_label(): line.get_ydata() for line in figure.axes[1].lines}
+    np.testing.assert_allclose(lines["captured"], [0, 0.6, 0.6, 0.2])
+    np.testing.assert_allclose(lines["free, inside"], [1, 0.4, 0.2, 0])
