@@ -56,7 +56,7 @@ OTHERS: dict[str, dict[str, Any]] = {
 """Settings of the dynamic separation that are compared with the usual ones."""
 SMALL_RADII = (2e-9, 1e-9)
 """Magnetic radii of colloids that fibres hardly hold, m."""
-MANY = 100_000
+DRAWN_COLLOIDS = 100_000
 """Colloids of a distribution."""
 WEIGHT_FRACTION, WATER_DENSITY = 5e-5, 1000.0
 """Fraction of magnetite in B16's suspension by weight (section 7.4.3), and the density of water, kg/m^3."""
@@ -101,7 +101,7 @@ def of_colloids(filter: PackedFilter) -> Iterator[Shown]:
         yield Shown(name, float(moment_of(radius) * filter.flux / energy), "held by the fibre if far above 1")
     own = replace(filter, **{name: OWN_COLLOIDS[name] for name in ("mean_radius", "polydispersity")})
     for one in (filter, own):
-        part = float((one.radii(MANY, 0) < SMALL_RADII[0]).mean())
+        part = float((one.radii(DRAWN_COLLOIDS, 0) < SMALL_RADII[0]).mean())
         mean, least = 1e9 * one.mean_radius, 1e9 * SMALL_RADII[0]
         name = f"part of colloids of mean radius {mean:.3g} nm that are below {least:g} nm"
         yield Shown(name, part)
