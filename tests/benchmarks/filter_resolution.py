@@ -19,9 +19,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from tisim import InputError
 from tisim.analysis import Mean
 from tisim.backend.processor import processor
-from tisim.cases.packed_filter.problem import FLOW_GRIDS, designed
+from tisim.cases.packed_filter.problem import designed
 from tisim.sources import PoreFlow
 
+CELLS_TRIED = ((24, 24, 48), (36, 36, 72), (48, 48, 96), (60, 60, 120))
 FRACTION = 0.13
 ASPECTS = (1.7, 5.0)
 
@@ -49,9 +50,9 @@ def main() -> None:
     for aspect in ASPECTS:
         design = {"diameter": 0.2e-3, "aspect": aspect, "fraction": FRACTION, "flux": 1.0}
         filters = [designed(design, seed, resolution=1.0) for seed in range(packings)]
-        finest = [pressure(one, FLOW_GRIDS[-1]) for one in filters]
+        finest = [pressure(one, CELLS_TRIED[-1]) for one in filters]
         low, high = filters[0].stretch(filters[0].box())
-        for cells in FLOW_GRIDS[:-1]:
+        for cells in CELLS_TRIED[:-1]:
             pairs = [(pressure(one, cells), last) for one, last in zip(filters, finest, strict=True)]
             off = [100 * (here / last - 1) for here, last in pairs if here and last]
             across = cells[0] * filters[0].matrix.diameter / (high[0] - low[0])
