@@ -59,6 +59,8 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
         axis.plot(times, [held_fraction(one) for one in states], color="#4477aa", label=HELD)
         axis.plot(times, [touched_fraction(one) for one in states], color="#4477aa", ls=":", label=TOUCHED)
         axis.set(xlabel="time (ms)", ylabel="fraction of the particles", ylim=(0, 1.02))
+        soonest = 1e3 * float(last["captured_at"][last["captured_at"] >= 0].min())
+        axis.set_title(f"the first after {soonest:.3g} ms, at the end {held_fraction(last):.3g}")
         axis.legend(frameon=False, fontsize=9)
         plain(axis)
     letters((left, right, *beside))

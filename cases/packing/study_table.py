@@ -71,12 +71,8 @@ class PackedRow:
 IDENTITY = tuple(one.name for one in fields(PackedRow)[:12])
 """Columns that are known before a packing is made."""
 
-
-MEASURES = (
-    *("fraction", "contacts", "touching", "held", "nematic", "cubatic", "aligned", "with_any"),
-    "attempts",
-)
-"""Columns of measures."""
+MEASURES = (*(one.name for one in fields(PackedRow)[13:]), "attempts")
+"""Columns of measures, the attempts last."""
 
 
 def key_of(known: Mapping[str, Any]) -> tuple[str, ...]:
@@ -102,8 +98,7 @@ def summary(rows: Sequence[PackedRow]) -> list[list[str]]:
     """Return the means of all measures over seeds with their 95 % intervals, a line for each packing, below a
     line of headings. Columns that are the same in all rows, or that do not apply, are left out."""
     settings = [
-        name for name in IDENTITY[:-1]
-        if len({key_of({**vars(one)})[IDENTITY.index(name)] for one in rows}) > 1
+        name for k, name in enumerate(IDENTITY[:-1]) if len({one.key()[k] for one in rows}) > 1
     ]  # fmt: skip
     groups: dict[tuple[str, ...], list[PackedRow]] = {}
     for one in sorted(rows, key=PackedRow.place):

@@ -150,7 +150,7 @@ def test_without_removes_an_effect_from_scene_and_kernels(tisim, impacts, tmp_pa
 
 
 def test_a_run_that_ends_by_itself_shows_steps_and_measures(tisim, tmp_path, monkeypatch, press_ctrl_c):
-    """Nobody knows its end, so neither a percentage nor evenly spaced frames mean anything."""
+    """The time of its end is unknown: the run has no percentage, and no frames at equal parts of it."""
     command = ("run", "packing", "--size", "small", "--out", "packed")
     code, _, err = tisim(*command, "--frames", "10")
     assert code == 2
