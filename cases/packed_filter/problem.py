@@ -16,7 +16,6 @@ the depth.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -75,11 +74,8 @@ SEARCHED: dict[str, dict[str, Any]] = {
     "small": {"number": 100, "resolution": 5.0, "digits": None},
     "default": {"number": 300, "resolution": 8.0},
 }
-"""Colloids of a run, least number of cells of its flow over D and the sum of its field, by size. An octree
+"""Colloids of a run, cells of its flow over D and the sum of its field, by size. An octree
 for each design does not pay for some hundred colloids."""
-FLOW_GRIDS = ((36, 36, 72), (48, 48, 96), (64, 64, 128), (100, 100, 200))
-"""Grids of the flow. A design has the coarsest one with ``resolution``; designs of one grid can be run as one
-batch."""
 MORE_COLLOIDS = {"pressure": 1, "throughput": 1, "select": 4}
 """Factor of the number of colloids by variant: the difference of two fractions is noisier than a fraction.
 With 100 colloids its standard deviation between starts is 0.15, with 400 it is 0.07."""
@@ -96,7 +92,7 @@ def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedF
     matrix = Matrix(design["diameter"], aspect, fraction, seed=seed, width=max(Matrix.width, float(width)))
     speed = design.get("speed", SPEED)
     transit = (matrix.depth + 2 * matrix.length + matrix.diameter) / speed
-    made = PackedFilter(
+    return PackedFilter(
         matrix,
         "dynamic",
         flux=design["flux"],
@@ -105,16 +101,6 @@ def designed(design: Mapping[str, float], seed: int, **settings: Any) -> PackedF
         duration=TRANSITS * transit,
         **settings,
     )
-    return replace(made, cells=grid(made))
-
-
-def grid(filter: PackedFilter) -> tuple[int, int, int]:
-    """Return the coarsest grid with the resolution of a filter; InputError if none has it."""
-    low, high = filter.stretch(filter.box())
-    least = filter.resolution * (np.array(high) - low) / filter.matrix.diameter
-    finest = filter.resolution * float((np.array(FLOW_GRIDS[-1]) / least).min())
-    must(finest >= filter.resolution, "resolution", f"at most {finest:.3g} cells over D", filter.resolution)
-    return next(one for one in FLOW_GRIDS if (np.array(one) >= least).all())
 
 
 def depth(result: Result) -> float:

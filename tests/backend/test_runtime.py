@@ -19,8 +19,9 @@ from tisim.backend.layout import Builder
 from tisim.backend.memory import Tree
 from tisim.backend.taichi import ti
 from tisim.backend.thread import in_taichi_thread
+from tisim.components.component import rounded
 from tisim.describe import diagnostics
-from tisim.engine.batches import Batches, rounded
+from tisim.engine.batches import Batches
 
 
 @pytest.mark.parametrize(

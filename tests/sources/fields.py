@@ -27,6 +27,8 @@ def _evaluate(source: ti.template(), r: ti.types.ndarray(), out: ti.types.ndarra
 
 def fields(sources, points):
     """B, (worlds, n, 3), and dB_a/dr_c, (worlds, n, 3, 3), of one source for each world at its points."""
+    room = {name: max(one.room()[name] for one in sources) for name in sources[0].room()}
+    sources = [one.with_room(room) for one in sources]
     key = (runtime.generation(), sources[0].structure())
     if key not in _bound:
         table = ParameterTable(sources[:1], WORLDS, runtime.current().real)

@@ -58,15 +58,14 @@ def run(
     """
     from tisim.engine import checkpoint
     from tisim.io import run_folder
-    from tisim.io.recording import recording_from_options
+    from tisim.io.recording import check_frames, recording_from_options
 
     scene_arguments.checkpoint_seconds()
     runtime.init(device, precision, threads, arithmetic)
     name, scene = scene_arguments.load_scene(target, size, seed, absent or (), changes or (), variant)
     out_folder = run_folder.RunFolder(folder or Path("out") / name)
     resume = out_folder.check(scene, fresh, overwrite)
-    rule = f"--every, as this run ends by itself long before its duration of {scene.duration:.3g} s"
-    must(frames is None or not scene.stepper.ends, "--frames", rule, frames)
+    check_frames(scene, frames, "--frames", "--every")
     recording = recording_from_options(out_folder.trajectory, frames, every, resume)
     with err().status("compiling"):
         simulation = Simulation(scene)

@@ -223,7 +223,8 @@ class Component(Checked):
 
     def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
         """Return, by name, rows of derived per-world numbers that a kernel reads as ``self.NAME(w, k)``; by
-        default none. The length of each row is compiled in."""
+        default none. The length of each row is compiled in, and must be the same for all parts of a
+        structure."""
         return {}
 
     @classmethod
@@ -232,17 +233,33 @@ class Component(Checked):
         that scenes with lists of similar lengths can run in one batch."""
         return max(cls.least_rows, 1 << (rows - 1).bit_length())
 
+    def needed_room(self) -> dict[str, int]:
+        """Return, by name, the number of rows that memory for each list of this part must hold at least."""
+        return {name: kind.list_capacity(len(getattr(self, name))) for name, kind in self.lists()}
+
+    def room(self) -> dict[str, int]:
+        """Return, by name, the number of rows for which each list has memory: the needed ones, or more
+        (``with_room``)."""
+        given: Mapping[str, int] = self.__dict__.get("_room", {})
+        needed = self.needed_room()
+        return {name: max(rows, given.get(name, 0)) if rows else 0 for name, rows in needed.items()}
+
+    def with_room(self, rows: Mapping[str, int]) -> Self:
+        """Return a copy with memory for at least this number of rows in the lists of these names, so that it
+        runs in one batch with parts that have longer lists. Lists without memory, for which nothing is
+        compiled, stay without."""
+        made = self.model_copy()
+        # Not a field: a part stays equal to one with other memory, and files do not have it.
+        made.__dict__["_room"] = dict(rows)
+        return made
+
     def structure(self) -> tuple[Any, ...]:
-        """Return everything that is compiled in: the class, every option, and the capacity of lists, but no
+        """Return everything that is compiled in: the class, every option, and the memory for lists, but no
         per-world parameters."""
         varying = {name for name, _, _ in self.parameters()} | {name for name, _ in self.lists()}
         options, members = (n for n in type(self).model_fields if n not in varying), self.members()
         fixed = tuple((n, members[n].structure() if n in members else getattr(self, n)) for n in options)
-        return (
-            type(self),
-            *fixed,
-            *((name, kind.list_capacity(len(getattr(self, name)))) for name, kind in self.lists()),
-        )
+        return (type(self), *fixed, *self.room().items())
 
     def lookups(self) -> dict[str, np.ndarray]:
         """Return, by name, lookup tables of shape (rows, columns) that a kernel reads as ``self.NAME[i, j]``.
@@ -300,6 +317,16 @@ def option(text: str, default: Any = ..., **rules: Any) -> Any:
     if not (isinstance(text, str) and text):
         raise TypeError(f"option must be given a text first; received {text!r}")
     return Field(default, description=text, **rules)
+
+
+def rounded(number: int) -> int:
+    """Round a number up to the next one whose binary digits are all 0 after the first three.
+
+    Sizes are compiled in. With rounded sizes, scenes of similar size share compiled kernels, within a process
+    and through the cache on disk.
+    """
+    unit = 1 << max(0, number.bit_length() - 3)
+    return -(-number // unit) * unit
 
 
 def _bounded(info: FieldInfo) -> bool:

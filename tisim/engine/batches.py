@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -9,10 +10,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, overload
 
 from tisim.backend import memory, runtime
+from tisim.components.component import rounded
 from tisim.console import shown_progress
 from tisim.engine.crowding import check_places
 from tisim.engine.observer import Observer
 from tisim.engine.result import Result, Status
+from tisim.engine.shared_room import SharedRooms, rows
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
@@ -30,8 +33,11 @@ IDLE_SIMULATIONS = 8
 SPARE, WASTE = 4096, 8
 """A kept simulation is reused only if its total capacity is at most SPARE particles, or WASTE times the
 capacity needed, because all of it is loaded and checked."""
-FEW_WORLDS = 8
-"""A small scene is compiled for this many worlds, because a few more worlds of it are often run later."""
+FEW_WORLDS, FEW_ROWS = 8, 50_000
+"""A small scene, with at most ``FEW_ROWS`` rows in its lists, is compiled for ``FEW_WORLDS`` worlds, because
+a few more worlds of it are often run later."""
+BATCH_ROWS = 50_000_000
+"""Largest number of rows in the lists of all worlds of a batch; it bounds the memory to some GB."""
 
 Progress = Callable[[float], None]
 
@@ -46,7 +52,7 @@ def progress_of_part(progress: Progress, finished_parts: int, parts: int) -> Pro
 
 class Batches:
     """Batches runs scenes and yields their results; scenes of one structure (effects, options, domain,
-    stepper) run side by side.
+    stepper) run side by side, also with lists of different lengths.
 
     limit : the largest number of worlds of a batch.
 
@@ -58,6 +64,7 @@ class Batches:
         must(limit >= 1, "batch", "at least 1", limit)
         self.limit = limit
         self._idle: list[Simulation] = []
+        self._rooms = SharedRooms()
         _all.add(self)
 
     def run(
@@ -75,7 +82,6 @@ class Batches:
             of its worlds.
         """
         starts: dict[int, Arrays] = {}
-        groups: dict[Any, list[int]] = {}
         failures: dict[int, str] = {}
         with placed_together(scenes):
             for index, scene in enumerate(scenes):
@@ -89,14 +95,17 @@ class Batches:
                     failures[index] = str(error)
                 else:
                     starts[index] = start
-                    groups.setdefault(scene.structure(), []).append(index)
+        roomy = dict(zip(starts, self._rooms.scenes([scenes[k] for k in starts]), strict=True))
+        groups: dict[Any, list[int]] = {}
+        for index, scene in roomy.items():
+            groups.setdefault(scene.structure(), []).append(index)
         yield from _refused(scenes, failures)
         finished_scenes = len(failures)
         for structure, members in groups.items():
-            with self.simulation(structure, [scenes[k] for k in members]) as simulation:
+            with self.simulation(structure, [roomy[k] for k in members]) as simulation:
                 for begin in range(0, len(members), simulation.worlds):
                     batch = members[begin : begin + simulation.worlds]
-                    refused = _load(simulation, batch, scenes, starts, strict)
+                    refused = _load(simulation, batch, roomy, starts, strict)
                     yield from _refused(scenes, refused)
                     finished_scenes += len(refused)
                     batch = [k for k in batch if k not in refused]
@@ -106,7 +115,8 @@ class Batches:
                     handed_on: set[int] = set()
                     for _ in simulation.chunks(observers=observers):
                         new = [w for w in simulation.ended() if w not in handed_on]
-                        yield from zip((batch[w] for w in new), simulation.results(new), strict=True)
+                        for w, result in zip(new, simulation.results(new), strict=True):
+                            yield batch[w], dataclasses.replace(result, scene=scenes[batch[w]])
                         handed_on.update(new)
                         if progress:
                             progress((finished_scenes + len(batch) * simulation.fraction()) / len(scenes))
@@ -118,15 +128,14 @@ class Batches:
 
         least : number of worlds that it has at least, whatever the limits of a batch.
         """
-        capacity = max(scene.capacity() for scene in scenes)
-        most = max(least, min(self.limit, BATCH_PARTICLES // capacity))
-        worlds = min(len(scenes), most)
+        capacity, room = max(scene.capacity() for scene in scenes), max(1, rows(scenes[0].rooms()))
+        worlds = min(len(scenes), max(least, self._most(capacity, room)))
         simulation = self._reusable(structure, worlds, capacity)
         if simulation is None:
             _restart_taichi()
             capacity = rounded(capacity)
-            few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE else 1
-            worlds = min(max(few, rounded(worlds)), max(least, min(self.limit, BATCH_PARTICLES // capacity)))
+            few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE and room <= FEW_ROWS else 1
+            worlds = min(max(few, rounded(worlds)), max(least, self._most(capacity, room)))
             simulation = Simulation(scenes[0], worlds, capacity)
         try:
             yield simulation
@@ -136,6 +145,10 @@ class Batches:
                 old, self._idle = self._idle[:-IDLE_SIMULATIONS], self._idle[-IDLE_SIMULATIONS:]
             for each in old:
                 each.close()
+
+    def _most(self, capacity: int, room: int) -> int:
+        """Return the largest number of worlds of a batch for a capacity and rows in the lists of a world."""
+        return min(self.limit, BATCH_PARTICLES // capacity, max(1, BATCH_ROWS // room))
 
     def _reusable(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
         """Take the smallest suitable simulation out of the idle ones; return None if none is suitable."""
@@ -165,7 +178,11 @@ class Batches:
 
 
 def _load(
-    simulation: Simulation, batch: list[int], scenes: Sequence[Scene], starts: dict[int, Arrays], strict: bool
+    simulation: Simulation,
+    batch: list[int],
+    scenes: Mapping[int, Scene],
+    starts: dict[int, Arrays],
+    strict: bool,
 ) -> dict[int, str]:
     """Load the scenes of a batch; return the reason for each that is refused, by index. These are left out.
 
@@ -199,16 +216,6 @@ def _refused(scenes: Sequence[Scene], reasons: Mapping[int, str]) -> Iterator[tu
 _lock = threading.Lock()
 """Held while a simulation is taken from or returned to the idle ones."""
 _all: weakref.WeakSet[Batches] = weakref.WeakSet()
-
-
-def rounded(number: int) -> int:
-    """Round a number up to the next one whose binary digits are all 0 after the first three.
-
-    Sizes are compiled in. With rounded sizes, scenes of similar size share compiled kernels, within a process
-    and through the cache on disk.
-    """
-    unit = 1 << max(0, number.bit_length() - 3)
-    return -(-number // unit) * unit
 
 
 def _restart_taichi() -> None:

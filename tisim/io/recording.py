@@ -25,7 +25,8 @@ class Recording:
     """A trajectory to record: ``frames`` at equal intervals over the duration, or a frame ``every`` time
     interval (s).
 
-    The start and the end are always recorded; the start is not counted in ``frames``.
+    The start and the end are always recorded; the start is not counted in ``frames``. InputError is raised
+    for ``frames`` of a run that ends by itself, such as a packing.
     """
 
     path: Path | str
@@ -48,6 +49,10 @@ class Recording:
         """Return the time between frames, s."""
         return self.every if self.every is not None else scene.duration / (self.frames or 1)
 
+    def _check(self, scenes: Sequence[Scene]) -> None:
+        for scene in scenes:
+            check_frames(scene, self.frames, "frames", "every")
+
     @contextmanager
     def recorders(
         self, scenes: Sequence[Scene], real: str = "f64"
@@ -57,6 +62,7 @@ class Recording:
 
         Its arguments are the simulation, and for each of its worlds the index of its scene in the file.
         """
+        self._check(scenes)
         with Trajectory(self.path, scenes, real) as trajectory:
             yield lambda simulation, indices: Recorder(trajectory, self.interval, simulation, indices)
 
@@ -68,6 +74,7 @@ class Recording:
         for a simulation with one world.
         """
         scenes, real = simulation.scenes, simulation.runtime.precision
+        self._check(scenes)
         if resume:
             time = float(simulation.monitor.last_good["time"][0])
             file = Trajectory.resume(self.path, scenes[0], time, real)
@@ -128,6 +135,15 @@ def _last_time(group: h5py.Group) -> float:
     """Return the time of the last frame, s; negative if there is none."""
     times = group["position/time"]
     return float(times[-1]) if len(times) else -1.0
+
+
+def check_frames(scene: Scene, frames: int | None, name: str, other: str) -> None:
+    """Raise InputError for a number of frames if a run ends by itself. name, other : of the settings in
+    messages."""
+    rule = (
+        f"left out for {other}, as this run ends by itself long before its duration of {scene.duration:.3g} s"
+    )
+    must(frames is None or not scene.stepper.ends, name, rule, frames)
 
 
 def recording_from_options(

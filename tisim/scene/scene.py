@@ -190,14 +190,31 @@ class Scene(Component, ShownInNotebook):
 
     def structure(self) -> tuple[Any, ...]:
         """Return the compiled-in part of the scene; scenes in which it is equal can run as one batch."""
-        parts = (*self.effects, self.domain, self.stepper)
+        parts = (*self._roomy(self.effects), self.domain, self.stepper)
         return *(part.structure() for part in parts), tuple(self.materials)
+
+    def rooms(self) -> tuple[Mapping[str, int], ...]:
+        """Return, for each effect, the number of rows for which each of its lists has memory, by name."""
+        return tuple(effect.room() for effect in self._roomy(self.effects))
+
+    def with_rooms(self, rows: Sequence[Mapping[str, int]]) -> Self:
+        """Return a copy that has, for each effect, memory for at least these rows of its lists, by name."""
+        made = self.model_copy()
+        made.__dict__["_room"] = tuple(rows)
+        return made
+
+    def _roomy(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+        """Return the effects with the memory of the scene for their lists."""
+        room = self.__dict__.get("_room")
+        if room is None:
+            return tuple(effects)
+        return tuple(effect.with_room(rows) for effect, rows in zip(effects, room, strict=True))
 
     def acting(self) -> tuple[Effect, ...]:
         """Return the effects, completed by data of the initial state, the materials and each other."""
         masses, materials = self.particles.masses(self.seed), Materials(self.materials, self.material_pairs)
-        return tuple(
-            _of(effect, materials).at_start(masses).completed_by(self.effects) for effect in self.effects
+        return self._roomy(
+            [_of(effect, materials).at_start(masses).completed_by(self.effects) for effect in self.effects]
         )
 
     def start(self, seed: int | None = None) -> Arrays:

@@ -72,7 +72,8 @@ def _slots(part: Component) -> int:
     The slots hold its own parameters, for each list the length and room for the rows, the derived values of
     each row, and the slots of its members.
     """
-    lists = sum(1 + _width(kind) * kind.list_capacity(len(getattr(part, n))) for n, kind in part.lists())
+    room = part.room()
+    lists = sum(1 + _width(kind) * room[name] for name, kind in part.lists())
     derived = sum(len(values) for values in part.derived_rows().values())
     return _width(type(part)) + lists + derived + sum(_slots(one) for one in part.members().values())
 
@@ -83,12 +84,13 @@ def _entries(part: Component, where: str) -> Iterator[tuple[str, np.ndarray]]:
     values = np.array(part.values(), float)
     for (name, size), end in zip(part.columns(), np.cumsum(sizes), strict=True):
         yield f"{where}.{name}", values[end - size : end]
+    room = part.room()
     for name, kind in part.lists():
         rows = getattr(part, name)
         yield f"{where}.{name}", np.array([float(len(rows))])
         for k, row in enumerate(rows):
             yield from _entries(row, f"{where}.{name}.{k}")
-        yield f"{where}.{name}", np.zeros(_width(kind) * (kind.list_capacity(len(rows)) - len(rows)))
+        yield f"{where}.{name}", np.zeros(_width(kind) * (room[name] - len(rows)))
     for name, derived in part.derived_rows().items():
         yield f"{where}.{name}", np.asarray(derived, float)
     for name, member in part.members().items():
@@ -112,9 +114,10 @@ class ParameterTable:
         for name, size in part.columns():
             setattr(bound, name, _reader(self.field, slot, size))
             slot += size
+        room = part.room()
         for name, kind in part.lists():
             setattr(bound, name, self._bind_rows(kind, slot))
-            slot += 1 + _width(kind) * kind.list_capacity(len(getattr(part, name)))
+            slot += 1 + _width(kind) * room[name]
         for name, derived in part.derived_rows().items():
             setattr(bound, name, _row_reader(self.field, slot, 1, 1))
             slot += len(derived)

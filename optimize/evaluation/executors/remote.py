@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
 from tisim import Result, RunError, Scene
+from tisim.engine.shared_room import SharedRooms
 from tisim.optimize.evaluation.executors import handshake
 from tisim.optimize.evaluation.executors.worker import Answer, WorkerSettings
 
@@ -112,10 +113,10 @@ class Remote:
 
 
 def units(scenes: Sequence[Scene], workers: int) -> list[list[int]]:
-    """Return the indices of the scenes of each unit of work; its scenes have one structure, so they run side
-    by side."""
+    """Return the indices of the scenes of each unit of work; its scenes have one structure apart from the
+    lengths of lists, so they run side by side."""
     groups: dict[Any, list[int]] = {}
-    for index, scene in enumerate(scenes):
+    for index, scene in enumerate(SharedRooms().scenes(scenes)):
         groups.setdefault(scene.structure(), []).append(index)
     size = max(1, -(-len(scenes) // (UNITS * max(1, workers))))
     return [group[k : k + size] for group in groups.values() for k in range(0, len(group), size)]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tisim import Recording, run
+from tisim import InputError, Recording, run
 from tisim.cases.packing import CASE
 from tisim.cases.packing.figures import pictures
 from tisim.cases.packing.measures import measured
@@ -33,7 +33,12 @@ def test_a_mixture_is_denser_than_equal_spheres():
 def test_the_pictures_of_a_run(tmp_path):
     """Bodies are drawn by their shapes, and bars count all of them; an ended packing lacks no frames."""
     scene = of_shape(rod(2.0), "small", 0, number=40, attempts=20, step=4.0)
-    record = Recording(tmp_path / "trajectory.h5", frames=3)
+    path = tmp_path / "trajectory.h5"
+    rule = r"^frames must be left out for every, as this run ends by itself long before .*; received 3$"
+    with pytest.raises(InputError, match=rule):
+        run(scene, record=Recording(path, frames=3))
+    assert not path.exists()
+    record = Recording(path, every=1e6)
     result = run(scene, record=record)
     with frames(record.path) as trajectory:
         assert trajectory.missing

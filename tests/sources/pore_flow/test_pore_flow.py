@@ -190,14 +190,16 @@ def test_flows_of_one_matrix_are_solved_once(monkeypatch):
 
 @pytest.mark.slow
 def test_worlds_of_a_batch_have_their_own_matrices(rng):
-    """Also of other numbers of bodies, directions and boxes."""
+    """Also of other numbers of bodies and cells, directions and boxes; the same bits as alone."""
     sources = [
         flow(),
         flow(cylinders=(), direction=(1, -1, 0), speed=1e-3),
         flow(spheres=(BALL, BALL.model_copy(update={"centre": (0.0, 0.0, 2 * MM)}))),
-        flow(high=(1 * MM, 2 * MM, 4 * MM), speed=None, pressure_gradient=5.0),
+        flow(high=(1 * MM, 2 * MM, 4 * MM), speed=None, pressure_gradient=5.0, cells=(20, 20, 40)),
     ]
-    assert len({source.structure() for source in sources}) == 1
+    room = sources[-1].room()
+    assert sources[0].structure() != sources[-1].structure()
+    assert len({source.with_room(room).structure() for source in sources}) == 1
     points = np.array(LOW) + SIDES * rng.uniform(0, 1, (40, 3))
     velocity, gradient = fields(sources, np.stack([points] * 4))
     for w, source in enumerate(sources):
@@ -347,3 +349,18 @@ def test_a_blocked_matrix_is_refused_before_a_run():
     plug = Cylinder(centre=(0, 0, 3 * MM), radius=3 * MM, length=0.5 * MM)
     with pytest.raises(InputError, match="pores must be open along the pressure gradient"):
         simulate([drifting(flow(cylinders=(plug,)))], capacity=4)
+
+
+def test_grids_of_one_cell_and_places_that_are_no_numbers(rng):
+    """A matrix that does not change along z needs one cell there; other memory is not read for a NaN."""
+    through = Cylinder(centre=(0.2 * MM, 0.7 * MM, 3.0 * MM), axis=(0, 0, 1), radius=0.35 * MM, length=9 * MM)
+    points = np.array(LOW) + SIDES * rng.uniform(0, 1, (30, 3))
+    points[0], points[1, 2] = np.nan, np.inf
+    one, many = (
+        flow(cylinders=(through,), spheres=(), direction=(1, 0, 0), cells=(16, 12, number))
+        for number in (1, 4)
+    )
+    velocity, _ = fields([one, many], np.stack([points] * 2))
+    assert np.isnan(velocity[:, :2]).all()
+    np.testing.assert_allclose(velocity[0, 2:], velocity[1, 2:], rtol=0, atol=1e-3 * 2e-3)
+    assert np.abs(velocity[0, 2:]).max() > 2e-3

@@ -128,6 +128,10 @@ class Walls(WallContacts, UsesMaterials, Force):
         """Return the index of the material of the walls among the materials of a scene."""
         return 0 if self.material is None else materials.index(self.material, f"{self.label}.material")
 
+    def room(self) -> dict[str, int]:
+        # Particles remember their contacts by the rows of these lists.
+        return self.needed_room()
+
     def kinds_of_surface(self) -> Iterator[str]:
         """Yield the names of the non-empty lists of surfaces."""
         return (name for name, kind in self.lists() if issubclass(kind, Surface) and getattr(self, name))
@@ -170,7 +174,7 @@ class Walls(WallContacts, UsesMaterials, Force):
         values = sum(effect.memory for effect in effects if isinstance(effect, GranularContact))
         moving = [one for one in effects if isinstance(one, Shaped) and one.moves]
         corners = moving[0].corners if moving else 1
-        slots = {"past": Plane.list_capacity(len(self.planes)) * corners * values, "loads": 6}
+        slots = {"past": self.room()["planes"] * corners * values, "loads": 6}
         if self.touches_surfaces and moving:
             slots["surface_past"] = self._rows()[-1] * corners * values
         elif self.touches_surfaces:
@@ -182,8 +186,8 @@ class Walls(WallContacts, UsesMaterials, Force):
 
     def _rows(self) -> list[int]:
         """Return the number of rows in the memory of the lists of surfaces before each list, and of all."""
-        kinds = dict(self.lists())
-        rows = [kinds[name].list_capacity(len(getattr(self, name))) for name in self.kinds_of_surface()]
+        room = self.room()
+        rows = [room[name] for name in self.kinds_of_surface()]
         return [0, *np.cumsum(rows).tolist()]
 
     def connect(self, peers: Peers) -> dict[str, Any]:

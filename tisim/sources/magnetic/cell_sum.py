@@ -32,6 +32,8 @@ FIRST_TOLERANCE, TRIES = 0.05, 4
 """First tolerance for one cylinder, over the wanted error of the sum, and number of tolerances tried."""
 ERROR_MARGIN = 1.5
 """Upper bound on the largest error in the region over the largest at the tested points."""
+KEPT_OCTREES = 16
+"""Number of octrees that are kept, as a scene asks for its own several times."""
 BOXES, BOX_POINTS = 400, 16
 """Number of small boxes in which errors are measured, and of points in each."""
 
@@ -95,24 +97,38 @@ def _errors(numbers: np.ndarray, tree: Octree, degree: int) -> tuple[float, floa
     return float(np.linalg.norm(wrong[:, :3], axis=1).max()), float(of_slope.max())
 
 
-def cell_row(cylinders: Sequence[Cylinder], digits: int, box: Corners | None = None) -> np.ndarray:
+def cell_row(
+    cylinders: Sequence[Cylinder], digits: int, box: Corners | None = None, room: int = 0
+) -> np.ndarray:
     """Return the packed octree for cylinders, made once for the running settings; raise InputError if it
     cannot be as accurate as wanted.
 
     box : corners of the box in which the sum is wanted, m; if not given, twice the box about all cylinders.
+    room : number of cylinders for which the row has room, if more than these.
     """
-    return _cell_row(tuple(cylinders), digits, box, runtime.current())
+    return _cell_row(tuple(cylinders), digits, box, room, runtime.current())
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=KEPT_OCTREES)
 def _cell_row(
-    cylinders: tuple[Cylinder, ...], digits: int, box: Corners | None, settings: runtime.Runtime
+    cylinders: tuple[Cylinder, ...], digits: int, box: Corners | None, room: int, settings: runtime.Runtime
 ) -> np.ndarray:
-    sizes = _numbers(Cylinder.list_capacity(len(cylinders)))
+    needed = Cylinder.list_capacity(len(cylinders))
+    # Limits are those of a world alone, so that its sum is the same to the last bit in every batch.
+    sizes, most_listed = _numbers(max(needed, room)), _numbers(needed)[2]
+    return _packed(_octree(cylinders, digits, box, settings), DEGREES[digits], sizes, most_listed)
+
+
+@lru_cache(maxsize=KEPT_OCTREES)
+def _octree(
+    cylinders: tuple[Cylinder, ...], digits: int, box: Corners | None, settings: runtime.Runtime
+) -> Octree | None:
+    """Return the octree, None without magnetised cylinders."""
     if not any(any(one.magnetisation) for one in cylinders):
-        return _packed(None, DEGREES[digits], sizes)
+        return None
     numbers, (low, high) = cylinder_rows.rows(cylinders), _region(cylinders)
-    root, most_leaves = np.array([*(0.5 * (low + high)), (high - low).max()]), sizes[1]
+    root = np.array([*(0.5 * (low + high)), (high - low).max()])
+    most_leaves = _numbers(Cylinder.list_capacity(len(cylinders)))[1]
     if box is not None:
         low, high = np.array(box)
         root = np.array([*(0.5 * (low + high)), 0.5 * (high - low).max()])
@@ -126,15 +142,16 @@ def _cell_row(
         tree = expand(cylinders, root, DEGREES[digits], (b, slope), most_leaves)
         error = ERROR_MARGIN * float((np.array(_errors(numbers, tree, DEGREES[digits])) / typical).max())
         if error <= 10.0**-digits:
-            return _packed(tree, DEGREES[digits], sizes)
+            return tree
         part *= min(0.5, 0.8 * 10.0**-digits / error)
     must(False, "sum_digits", f"fewer for these cylinders in {settings.precision}", digits)
     raise AssertionError
 
 
-def _packed(tree: Octree | None, degree: int, sizes: tuple[int, int, int]) -> np.ndarray:
-    """Return the row of an octree. A leaf whose near cylinders have no room in the list is marked by a last
-    one before the first; there all cylinders are summed directly. No tree stands for a root of size 0."""
+def _packed(tree: Octree | None, degree: int, sizes: tuple[int, int, int], most_listed: int) -> np.ndarray:
+    """Return the row of an octree. A leaf whose near cylinders would make the list longer than
+    ``most_listed`` is marked by a last one before the first; there all cylinders are summed directly. No tree
+    stands for a root of size 0."""
     nodes, leaves, listed = sizes
     width = 2 + solid_harmonics.number(degree)
     row = np.zeros(4 + nodes + width * leaves + listed)
@@ -149,7 +166,7 @@ def _packed(tree: Octree | None, degree: int, sizes: tuple[int, int, int]) -> np
     small = 1e-12 * np.abs(tree.coefficients).max()
     for k, leaf in enumerate(ends):
         near = tree.near[leaf]
-        if used + len(near) > listed:
+        if used + len(near) > most_listed:
             table[k, :2] = 0, -1
             continue
         at = 4 + nodes + width * leaves + used

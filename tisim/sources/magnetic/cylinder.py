@@ -131,14 +131,14 @@ class MagneticCylinders(Magnets):
     def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
         rows = dict(super().derived_rows())
         if self.sum_digits is not None:
-            rows["cells"] = cell_row(self.cylinders, self.sum_digits, self.sum_box)
+            rows["cells"] = cell_row(self.cylinders, self.sum_digits, self.sum_box, self.room()["cylinders"])
         return rows
 
     def connect(self, peers: Peers) -> dict[str, Any]:
         bound, digits, cells = peers.bound(self), self.table_digits, self.sum_digits
         bound.cylinders.ends = ClosedEnds() if digits is None else TabulatedEnds(bound.table, digits)
-        capacity = Cylinder.list_capacity(len(self.cylinders))
-        in_cells = None if cells is None else CellSum(bound.cells, capacity, cells)
+        room = self.room()["cylinders"]
+        in_cells = None if cells is None else CellSum(bound.cells, room, cells)
         return {**super().connect(peers), "in_cells": in_cells, "has_cells": cells is not None}
 
     @ti.func

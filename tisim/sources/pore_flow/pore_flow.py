@@ -1,5 +1,6 @@
 """The flow of a fluid through a matrix of fibres and spheres, as a source that drag laws use."""
 
+import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
@@ -9,7 +10,7 @@ from pydantic import field_validator, model_validator
 
 from tisim.backend.taichi import ti
 from tisim.compiling import compiling
-from tisim.components.component import Vector
+from tisim.components.component import Vector, rounded
 from tisim.components.ranges import check_direction
 from tisim.effects.base import SceneParts
 from tisim.errors import Words, must
@@ -21,8 +22,9 @@ from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stok
 from tisim.sources.switched import NO_END, Switched
 
 AXIS_NAMES = ("x", "y", "z")
-KEPT_BYTES = 500_000_000
+KEPT_BYTES = 2_000_000_000
 """Memory of solved flows that are kept for later scenes of the process, at least one of them."""
+ONE_CELL = (1, 1, 1)
 WHOLE_PERIODS = 1e-9
 """Relative rounding of the number of periods of the flow in a domain."""
 
@@ -105,7 +107,9 @@ class PoreFlow(Switched):
         examples=[(Cylinder(radius=1e-4, length=5e-4),)],
     )
     spheres: tuple[Sphere, ...] = option("spheres; worlds may have different ones", (), examples=[()])
-    cells: tuple[int, int, int] = option("cells of the grid along x, y and z", (64, 64, 64))
+    cells: tuple[int, int, int] = option(
+        "cells of the grid along x, y and z; worlds may have different ones", (64, 64, 64)
+    )
     column: Column = option("walls around the matrix: none, a rectangular duct or a round tube", "none")
     axis: Literal["x", "y", "z"] = option("axis along which a duct or a tube is open", "z")
     outside: Literal["periodic", "uniform"] = option(
@@ -120,6 +124,7 @@ class PoreFlow(Switched):
     if TYPE_CHECKING:
         grid: ClassVar[Any]
         depth: ClassVar[Any]
+        sides: ClassVar[Any]
         mean: ClassVar[Any]
         scale: ClassVar[Any]
 
@@ -215,18 +220,21 @@ class PoreFlow(Switched):
 
     def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
         flow = self.solve()
+        room = self.room()["grid"]
         return {
-            "grid": flow.velocity.ravel(),
-            "depth": flow.distance.ravel(),
+            "grid": padded(flow.velocity, 3 * room),
+            "depth": padded(flow.distance, room),
+            "sides": [*self.cells, *self._grid.shape],
             "mean": flow.mean,
             "scale": [self.superficial_speed()],
             "unit": [self.shortest_length()],
         }
 
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Return the cells of the grid along each axis, with cells inside walls."""
-        return self._grid.shape
+    def needed_room(self) -> dict[str, int]:
+        return {**super().needed_room(), "grid": rounded(math.prod(self._grid.shape))}
+
+    def structure(self) -> tuple[Any, ...]:
+        return super(PoreFlow, self.with_room(self.room()).model_copy(update={"cells": ONE_CELL})).structure()
 
     @property
     def walled(self) -> tuple[bool, bool, bool]:
@@ -282,10 +290,10 @@ class PoreFlow(Switched):
         corner = ti.floor(place)
         x, first = place - corner, ti.cast(corner, ti.i32)
         near, normal = 0.0 * x[0], 0.0 * x
-        n = ti.static(self.shape)
+        n = self.shape(w)
         for i, j, k in ti.static(ti.ndrange(2, 2, 2)):
-            index = (self.wrapped(first[0] + i, 0) * n[1] + self.wrapped(first[1] + j, 1)) * n[2]
-            d = self.depth(w, index + self.wrapped(first[2] + k, 2))
+            index = (wrapped(first[0] + i, n[0]) * n[1] + wrapped(first[1] + j, n[1])) * n[2]
+            d = self.depth(w, index + wrapped(first[2] + k, n[2]))
             p, q, s = x[0] if i else 1.0 - x[0], x[1] if j else 1.0 - x[1], x[2] if k else 1.0 - x[2]
             near += p * q * s * d
             normal[0] += (d if i else -d) * q * s
@@ -303,15 +311,15 @@ class PoreFlow(Switched):
     def between(self, w, place, per):
         """Return velocity and gradient (1/m) from splines, in units of the superficial speed."""
         v, slope = 0.0 * place, 0.0 * place.outer_product(place)
+        n = self.shape(w)
         for a in ti.static(range(3)):
             first, weight, change = self.splines(place, a)
             for i in ti.static(range(3 if a == 0 else 2)):
-                x = self.wrapped(first[0] + i, 0)
+                x = wrapped(first[0] + i, n[0])
                 for j in ti.static(range(3 if a == 1 else 2)):
-                    y = self.wrapped(first[1] + j, 1)
+                    y = wrapped(first[1] + j, n[1])
                     for k in ti.static(range(3 if a == 2 else 2)):
-                        z = self.wrapped(first[2] + k, 2)
-                        n = ti.static(self.shape)
+                        z = wrapped(first[2] + k, n[2])
                         u = self.grid(w, ((a * n[0] + x) * n[1] + y) * n[2] + z)
                         v[a] += u * weight[0, i] * weight[1, j] * weight[2, k]
                         slope[a, 0] += u * change[0, i] * weight[1, j] * weight[2, k]
@@ -327,7 +335,7 @@ class PoreFlow(Switched):
         velocity there is interpolated; and the cells per length (1/m) by which it changes."""
         place, inside, per = 0.0 * r, True, 0.0 * r
         for a in ti.static(range(3)):
-            n, whole = ti.static(float(self.cells[a]), float(self.shape[a]))
+            n, whole = self.sides(w, a), self.sides(w, 3 + a)
             per[a] = n / (self.high(w)[a] - self.low(w)[a])
             place[a] = (r[a] - self.low(w)[a]) * per[a]
             if ti.static(self.walled[a]):
@@ -366,7 +374,25 @@ class PoreFlow(Switched):
         return first, weight, change
 
     @ti.func
-    def wrapped(self, i, axis: ti.template()):  # type: ignore[valid-type]
-        """Return the index of the periodic image, inside the grid, of cell i along an axis."""
-        n = ti.static(self.shape[axis])
-        return (i % n + n) % n
+    def shape(self, w):
+        """Return the cells of the grid along each axis, with cells inside walls."""
+        return ti.Vector([ti.cast(self.sides(w, 3 + a), ti.i32) for a in ti.static(range(3))])
+
+
+@ti.func
+def wrapped(i, n):
+    """Return the index of the periodic image, among n cells, of cell i, at most two cells before the first or
+    three behind the last one."""
+    # Faster than the remainder of a division, also of a single cell.
+    k = i
+    for _ in ti.static(range(2)):
+        k += ti.select(k < 0, n, 0)
+    for _ in ti.static(range(3)):
+        k -= ti.select(k >= n, n, 0)
+    # A place that is no number must not read other memory.
+    return ti.max(0, ti.min(k, n - 1))
+
+
+def padded(values: np.ndarray, size: int) -> np.ndarray:
+    """Return the values as one row, with zeros up to a size."""
+    return np.pad(values.ravel(), (0, size - values.size))
