@@ -9,6 +9,10 @@ by their centres, so that they protrude from both faces of the matrix by up to h
 
 With ``tube``, rods are packed in a round tube in place of a cube, as in B16's separation cells of 20 and
 40 mm: 2 to 10 lengths of the fibres of 4 to 11 mm (section 7.3.2).
+
+With ``parallel``, all fibres have one direction, as in the matrix of fibres across the field that B16
+proposes (section 6.5). They are added one by one at random places that are free (random sequential
+addition).
 """
 
 import math
@@ -16,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
@@ -29,6 +34,7 @@ from tisim.geometry import CylindricalContainer
 from tisim.shapes import SpherocylinderShape
 from tisim.sources import Cylinder, magnetise
 from tisim.sources.magnetic import soft_magnet, stoner_wohlfarth
+from tisim.sources.pore_flow.pore_flow import AXIS_NAMES
 from tisim.steppers import EnergyMinimisation
 
 LOOSE = 0.03
@@ -43,6 +49,8 @@ STEEL_SATURATION = 2.2e6
 """Saturation magnetisation of the fibres, A/m (B16 section 7.3.4)."""
 IMAGE_REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
+MOST_TRIES = 200_000
+"""Random places that are tried for parallel fibres."""
 CLEAR = 1.001
 """Colloids start outside the fibres, enlarged by this factor."""
 
@@ -55,7 +63,8 @@ class Matrix:
     layers : cubes, or lengths of tube, along the flow, which are copies of one packing. seed : of the
     packing. width : least side of the cube, or length of the tube, over the length of a rod with its caps; 2
     or more, so that a rod touches no two images of another. tube : diameter of the tube over the same length;
-    None for a cube that is periodic across the flow.
+    None for a cube that is periodic across the flow. parallel : axis along which all fibres lie; None for
+    fibres in random directions.
     """
 
     diameter: float = 0.4e-3
@@ -65,6 +74,7 @@ class Matrix:
     seed: int = 0
     width: float = 2.05
     tube: float | None = None
+    parallel: Literal["x", "y", "z"] | None = None
 
     @property
     def length(self) -> float:
@@ -113,9 +123,16 @@ class Matrix:
         """Return the fibres, not magnetised. They are around the axis z, and their centres at 0..depth (m)
         along it.
 
-        InputError if rods of this aspect ratio jam before they have the fraction.
+        InputError if fibres of this aspect ratio jam before they have the fraction.
         """
-        centres, axes = _packing(self.aspect, self.fraction, self.number, self.seed, self.across)
+        if self.parallel is None:
+            centres, axes = _packing(self.aspect, self.fraction, self.number, self.seed, self.across)
+        else:
+            must(self.tube is None, "tube", "left out with parallel fibres", self.tube)
+            axis = AXIS_NAMES.index(self.parallel)
+            side = self.sides[0] / self.diameter
+            centres = _parallel(self.aspect, self.fraction, self.number, self.seed, axis, side)
+            axes = np.tile(np.eye(3)[axis], (self.number, 1))
         centres = (centres - 0.5 * (1 - np.array(FLOW_DIRECTION))) * self.sides
         return tuple(
             Cylinder(
@@ -217,6 +234,24 @@ def _packing(
         # The tube grows with the rods, beyond the box of their start.
         sides[:2] = across * packing.scale[0]
     return 0.5 + (packing.position - (packing.low + packing.high) / 2) / sides, packing.axes()[:, 2]
+
+
+@lru_cache(KEPT_MATRICES)
+def _parallel(aspect: float, fraction: float, number: int, seed: int, axis: int, side: float) -> np.ndarray:
+    """Return centres of parallel cylinders in units of the side (D) of a periodic cube, from 0 to 1, shape
+    (n, 3). axis : 0, 1 or 2, along which they lie."""
+    generator = np.random.default_rng([seed, 0x9A2A11E1])
+    across = [b for b in range(3) if b != axis]
+    found = np.empty((0, 3))
+    for place in generator.uniform(size=(MOST_TRIES, 3)):
+        away = side * np.abs((found - place + 0.5) % 1 - 0.5)
+        if ((np.hypot(*away[:, across].T) > 1) | (away[:, axis] > aspect)).all():
+            found = np.vstack([found, place])
+        if len(found) == number:
+            return found
+    rule = f"at most {fraction * len(found) / number:.3f} for parallel fibres of L/D = {aspect:g}"
+    must(False, "fraction of fibres", f"{rule}, which find no more places", fraction)
+    raise AssertionError
 
 
 def _vector(v: np.ndarray) -> Vector:

@@ -58,6 +58,36 @@ def test_fibres_fill_their_fraction_of_a_tube_and_are_inside():
     assert {-1.0, 0.0, 1.0} <= along
 
 
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_parallel_fibres_do_not_overlap(axis):
+    """No point is in two of them or of their images; they fill their fraction of the cube."""
+    matrix = Matrix(aspect=3.0, fraction=0.3, parallel=axis)
+    fibres, side = matrix.fibres(), matrix.sides[0]
+    assert {one.axis for one in fibres} == {tuple(np.eye(3)["xyz".index(axis)])}
+    assert len({one.centre for one in Matrix(aspect=3.0, fraction=0.3, parallel=axis, seed=1).fibres()} &
+               {one.centre for one in fibres}) == 0  # fmt: skip
+    points = np.random.default_rng(0).uniform(-side / 2, side / 2, (100_000, 3))
+    inside = np.zeros(len(points), int)
+    for one in fibres:
+        away = points - one.centre
+        away -= side * np.rint(away / side)
+        along = away @ one.direction
+        inside += (np.linalg.norm(away - np.outer(along, one.direction), axis=1) < one.radius) & (
+            np.abs(along) < one.length / 2
+        )
+    assert inside.max() == 1
+    assert inside.mean() == pytest.approx(0.3, abs=5 * np.sqrt(0.3 * 0.7 / len(points)))
+
+
+def test_matrices_of_parallel_fibres_that_are_refused(monkeypatch):
+    monkeypatch.setattr("tisim.cases.packed_filter.matrix.MOST_TRIES", 5000)
+    rule = r"^fraction of fibres must be at most 0\.3\d+ for parallel fibres of L/D = 2, which find no more "
+    with pytest.raises(InputError, match=rule + "places; received 0.7"):
+        Matrix(aspect=2.0, fraction=0.7, parallel="y").fibres()
+    with pytest.raises(InputError, match=r"^tube must be left out with parallel fibres; received 2"):
+        Matrix(tube=2.0, parallel="y").fibres()
+
+
 @pytest.mark.slow
 def test_layers_are_copies_along_the_flow():
     one, two = MATRIX.fibres(), Matrix(aspect=2.0, fraction=0.2, layers=2).fibres()
