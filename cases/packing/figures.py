@@ -1,28 +1,31 @@
 """Figures of the case packing: a packing coloured by contacts, and all figures of B16 chapters 2 to 4."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tisim.analysis.packings.packed_bodies import PackedBodies
-from tisim.analysis.packings.packing_fractions import packing_fraction
+from tisim.analysis.packings.packing_fractions import FractionProfile, fraction_profile, packing_fraction
 from tisim.cases.packing import curves, snapshots
 from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.overlap_removal import removal_figure, removal_table, removals
 from tisim.cases.packing.snapshots import Packing
-from tisim.cases.packing.studies import measured_packings, plans
+from tisim.cases.packing.studies import container_of, measured_packings, plans
 from tisim.cases.packing.study_table import PackedRow, Study, table
 from tisim.engine.batches import Progress, progress_of_part
 from tisim.io.reader import Frames
-from tisim.plotting.packings import structure
+from tisim.plotting.packings import order, structure
 from tisim.plotting.style import empty, letters, plain
 
 STARTS = {"small": 2, "default": 3, "paper": 3}
 """Random starts of each packing, by size."""
 CYLINDER_STARTS = {"small": 2, "default": 3, "paper": 5}
 """Random starts of each packing in a cylinder."""
+PROFILE_DEPTH, PROFILE_BINS = 4.0, 40
+"""Distance (D) from a wall up to which the packing fraction is drawn, and number of layers."""
 DRAWN: tuple[Study, ...] = ("aspect ratio", "moment of inertia", "cylinder", "wedge", "superballs")
 
 
@@ -47,8 +50,8 @@ def pictures(trajectory: Frames) -> Mapping[str, Figure]:
 def figures(size: str, progress: Progress) -> Mapping[str, Figure | str]:
     """rods.png, inertia.png, cylinder.png, wedge.png, superballs.png: densities, contacts and order; pictures
     of packings in cylinders.png, wedges.png and superball_packings.png; wedge_directions.png; structure.png
-    with neighbours and pores; overlaps.png and overlaps.csv, the overlaps of triples by attempt; and
-    packings.csv with all packings of a size."""
+    with neighbours and pores; order.png with rattlers, bond order and layers at walls; overlaps.png and
+    overlaps.csv, the overlaps of triples by attempt; and packings.csv with all packings of a size."""
     made: dict[Study, list[Packing]] = {}
     for k, study in enumerate(DRAWN):
         part = progress_of_part(progress, k, len(DRAWN))
@@ -94,6 +97,7 @@ def drawn(made: Mapping[Study, list[Packing]]) -> dict[str, Figure]:
     shown = compared_bodies(made)
     return {
         **({"structure.png": structure(shown)} if shown else {}),
+        **({"order.png": order(shown, wall_profiles(made.get("cylinder", [])))} if shown else {}),
         **{name: draw(rows[study]) for name, (study, draw) in curves_of.items() if study in rows},
         **{name: draw(made[study]) for name, (study, draw) in bodies_of.items() if study in made},
     }
@@ -113,3 +117,33 @@ def compared_bodies(made: Mapping[Study, list[Packing]]) -> dict[str, PackedBodi
     }
     some = {title: bodies for title, bodies in found.items() if bodies is not None}
     return some if len(some) == len(wanted) else {}
+
+
+def wall_profiles(made: list[Packing]) -> dict[str, FractionProfile]:
+    """Return the packing fraction by distance (D) from the wall of the widest cylinders of a study, by
+    title: one for each aspect ratio, the mean of its starts."""
+    found: dict[str, FractionProfile] = {}
+    widest = max((row.width for row, _ in made), default=0.0)
+    for shape in sorted({row.shape for row, _ in made}):
+        each = [profile(row, one) for row, one in made if row.shape == shape and row.width == widest]
+        if each:
+            title = "spheres" if shape == 1 else f"rods, L/D = {shape - 1:g}"
+            mean = np.mean([one.fraction for one in each], axis=0)
+            found[f"{title} in a cylinder of {widest:g} D"] = each[0]._replace(fraction=mean)
+    return found
+
+
+def profile(row: PackedRow, bodies: PackedBodies) -> FractionProfile:
+    """Return the packing fraction of a packing by distance (D) from the walls of its container."""
+    container, unit = container_of(row), float(bodies.diameters()[0])
+    assert container is not None
+    side, low = bodies.high - bodies.low, bodies.low
+    # The box of the start does not grow with the container.
+    size = container.box_of(container.volume_in(side, unit), unit)
+    around = replace(bodies, low=low + (side - size) / 2, high=low + (side + size) / 2)
+
+    def distance(places: np.ndarray) -> np.ndarray:
+        return container.distances(places - low, side, unit)[0].min(axis=1)
+
+    layers = fraction_profile(around, distance, np.linspace(0, PROFILE_DEPTH * unit, PROFILE_BINS + 1))
+    return layers._replace(edges=layers.edges / unit)

@@ -1,4 +1,6 @@
-"""The figures of directions of rods, and of neighbours and pores."""
+"""The figures of directions of rods, of neighbours and pores, and of rattlers and bond order."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +14,8 @@ from tisim.analysis import (
     pore_sizes,
     surface_correlation,
 )
-from tisim.plotting.packings import directions, structure
+from tisim.analysis.packings.packing_fractions import FractionProfile
+from tisim.plotting.packings import CRYSTALS, directions, order, structure
 from tisim.shapes import SphereShape, SpherocylinderShape
 
 
@@ -68,3 +71,54 @@ def test_neighbours_and_pores_of_two_packings_are_drawn_side_by_side(rng):
     ):
         with pytest.raises(InputError, match=message):
             structure(given, reach=0.0)
+
+
+LATTICES = {
+    "fcc": ([(0, 0, 0), (0, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 0.5, 0)], (1, 1, 1), 2**-0.5),
+    "bcc": ([(0, 0, 0), (0.5, 0.5, 0.5)], (1, 1, 1), 0.75**0.5),
+    "hcp": ([(0, 0, 0), (0.5, 0.5, 0), (0.5, 5 / 6, 0.5), (0, 1 / 3, 0.5)], (1, 3**0.5, (8 / 3) ** 0.5), 1.0),
+}
+"""Places of the bodies of a cell in its sides, the sides, and the distance of neighbours."""
+
+
+def lattice(name, cells=3):
+    """Spheres that touch their neighbours in a lattice."""
+    basis, sides, near = LATTICES[name]
+    corners = np.stack(np.meshgrid(*3 * [np.arange(cells)], indexing="ij"), -1).reshape(-1, 1, 3)
+    high = cells * np.array(sides)
+    # Voronoi cells of an exact lattice can have facets of no area.
+    moved = 1e-6 * np.random.default_rng(2).normal(size=(len(basis) * cells**3, 3))
+    places = ((corners + np.array(basis)).reshape(-1, 3) * sides + moved) % high
+    return PackedBodies.of(SphereShape(diameter=near), places, low=(0, 0, 0), high=high)
+
+
+def test_rattlers_and_bond_order_of_crystals_are_drawn(rng):
+    """No sphere of a crystal is a rattler if gaps of 1e-4 D count, all spheres far apart are; crosses are at
+    the bond order of the lattices; layers at a wall are drawn as given."""
+    made = {name: lattice(name) for name in LATTICES}
+    apart = PackedBodies.of(
+        SphereShape(diameter=0.1), rng.uniform(0, 12, (40, 3)), low=(0, 0, 0), high=(12,) * 3
+    )
+    layers = FractionProfile(np.array([0.0, 0.5, 1.0]), np.array([0.7, 0.5]), np.zeros(2), np.ones(2))
+    figure = order({**made, "gas": apart}, {"at a wall": layers})
+    loose, bonds, walls = figure.axes
+    for name, line, points in zip([*made, "gas"], loose.lines, bonds.lines, strict=False):
+        gap, part = line.get_data()
+        assert (part[gap > 1e-4] == (name == "gas")).all()
+        if name in CRYSTALS:
+            q4, q6 = points.get_data()
+            np.testing.assert_allclose(np.column_stack([q4, q6]), [CRYSTALS[name]] * len(q4), atol=1e-3)
+    assert [text.get_text() for text in loose.get_legend().texts] == [*made, "gas"]
+    np.testing.assert_array_equal(walls.patches[0].get_data()[0], layers.fraction)
+    assert len(order(made).axes) == 2
+    for given, message in (
+        ({}, "packings must be at least one"),
+        ({"x": apart_from_walls(apart)}, "periodic"),
+    ):
+        with pytest.raises(InputError, match=message):
+            order(given)
+
+
+def apart_from_walls(packing):
+    """The same bodies between walls."""
+    return replace(packing, periodic=(False, True, True))

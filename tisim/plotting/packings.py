@@ -1,4 +1,4 @@
-"""Figures of packings: the directions of rods, and the neighbours and pores of bodies."""
+"""Figures of packings: directions of rods, neighbours and pores, rattlers, bond order and layers at walls."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from tisim.analysis.packings.bond_order import bond_order, voronoi_bonds
+from tisim.analysis.packings.contact_numbers import contact_numbers
 from tisim.analysis.packings.packed_bodies import PackedBodies
+from tisim.analysis.packings.packing_fractions import FractionProfile
 from tisim.analysis.packings.pores import pore_sizes
 from tisim.analysis.packings.surface_correlation import surface_correlation
 from tisim.analysis.packings.tortuosity import packing_diffusion
@@ -15,6 +18,15 @@ from tisim.analysis.packings.wall_alignment import DirectionHistogram
 from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
+RATTLER_GAPS = np.logspace(-6, -2, 9)
+"""Gaps (D) up to which bodies are in contact, for the part of rattlers."""
+CRYSTALS = {
+    "fcc": (0.191, 0.575),
+    "hcp": (0.097, 0.485),
+    "bcc": (0.224, 0.567),
+    "icosahedron": (0.0, 0.663),
+}
+"""Bond order q_4 and q_6 of lattices of spheres and of twelve spheres around one, with Voronoi weights."""
 GAP_BINS = 20
 """Number of intervals of the gap in the pair correlation of surfaces."""
 
@@ -83,6 +95,45 @@ def structure(packings: Mapping[str, PackedBodies], spacing: float = 0.1, reach:
     paths.plot(law, law**-0.5, color="0.6", lw=0.9, ls="--", label=r"$\epsilon^{-1/2}$")
     paths.set(xlabel=r"porosity $\epsilon$", ylabel="tortuosity factor")
     paths.legend(frameon=False, fontsize=8)
+    for axis in panels:
+        plain(axis)
+    letters(panels)
+    return figure
+
+
+def order(
+    packings: Mapping[str, PackedBodies], profiles: Mapping[str, FractionProfile] | None = None
+) -> Figure:
+    """Draw how packings are held and how far they are from order: the part of rattlers by the gap up to which
+    bodies count as in contact, the bond order q_4 and q_6 of each body beside crystals, and packing fractions
+    by distance from a wall.
+
+    packings : by title, periodic along all axes. profiles : by title, with distances in D.
+    """
+    must(len(packings) > 0, "packings", "at least one", len(packings))
+    for title, one in packings.items():
+        must(all(one.periodic), f"packing {title!r}", "periodic along all axes", one.periodic)
+    figure = empty(12.6 if profiles else 8.6, 3.9)
+    panels = figure.subplots(1, 3 if profiles else 2)
+    loose, bonds = panels[:2]
+    for (title, one), colour in zip(packings.items(), AXIS_COLOURS * len(packings), strict=False):
+        numbers = contact_numbers(one, RATTLER_GAPS)
+        loose.semilogx(numbers.cutoff, numbers.rattlers / len(one), "o-", ms=3, color=colour, label=title)
+        found = voronoi_bonds(one)
+        q4, q6 = (bond_order(len(one), found, degree).local for degree in (4, 6))
+        bonds.plot(q4, q6, "o", ms=2.5, mew=0, alpha=0.6, color=colour)
+    for name, place in CRYSTALS.items():
+        bonds.plot(*place, "k+", ms=9)
+        bonds.annotate(name, place, xytext=(5, 4), textcoords="offset points", fontsize=8)
+    loose.set(xlabel="gap up to which bodies touch over D", ylabel="part of rattlers")
+    loose.set_ylim(bottom=0)
+    loose.legend(frameon=False, fontsize=8)
+    bonds.set(xlabel="bond order $q_4$ of a body", ylabel="$q_6$")
+    for (title, layers), colour in zip((profiles or {}).items(), AXIS_COLOURS * len(packings), strict=False):
+        panels[2].stairs(layers.fraction, layers.edges, baseline=None, color=colour, lw=1.4, label=title)
+        panels[2].set(xlabel="distance from the wall over D", ylabel="packing fraction", xlim=(0, None))
+        panels[2].set_ylim(bottom=0)
+        panels[2].legend(frameon=False, fontsize=8)
     for axis in panels:
         plain(axis)
     letters(panels)

@@ -9,7 +9,7 @@ from tisim.analysis import Mean
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.cases.packing.comparisons import compared, scaled, shortest_fraction
 from tisim.cases.packing.curves import of_cylinders, of_rods, of_superballs, of_wedges
-from tisim.cases.packing.figures import compared_bodies
+from tisim.cases.packing.figures import compared_bodies, profile, wall_profiles
 from tisim.cases.packing.measures import contact_counts
 from tisim.cases.packing.scene import rod
 from tisim.cases.packing.snapshots import direction_shares, in_cylinders, in_wedges, wedge_directions
@@ -271,6 +271,31 @@ def test_neighbours_of_spheres_rods_and_superballs_are_compared_if_all_are_there
         "superballs, exponent 4": "exponent 4",
     }
     assert compared_bodies({"aspect ratio": rods}) == {}
+
+
+def test_layers_at_the_wall_of_a_cylinder():
+    """Spheres of diameter 2 in a row on the axis of a cylinder four times as wide, whose box has stayed
+    behind: none within 1.5 D of the wall, and the row beyond fills what spheres in a tube of their width do;
+    titles have the shape, and the widest cylinder is drawn."""
+    unit, number = 2.0, 9
+    places = np.column_stack([np.full((number, 2), 0.5), unit * (0.5 + np.arange(number))])
+    axis = (False, False, True)
+    bodies = PackedBodies.of(
+        SphereShape(diameter=unit), places, (0, 0, 0), (1, 1, unit * number), periodic=axis
+    )
+    wide, narrow = (row("cylinder", 1.0, width=width) for width in (4.0, 2.0))
+    layers = profile(wide, bodies)
+    assert layers.edges[-1] == 4.0
+    middle = 0.5 * (layers.edges[1:] + layers.edges[:-1])
+    assert (layers.fraction[middle < 1.5] == 0).all()
+    # The part of a line at a distance h from the axis, of radius 1/2 in D, that is within spheres.
+    within = (middle > 1.5) & (middle < 2)
+    expected = np.sqrt(1 - 4 * (2 - middle[within]) ** 2)
+    np.testing.assert_allclose(layers.fraction[within], expected, atol=0.06)
+    shown = wall_profiles([(wide, bodies), (replace(wide, seed=1), bodies), (narrow, bodies)])
+    assert list(shown) == ["spheres in a cylinder of 4 D"]
+    np.testing.assert_allclose(shown["spheres in a cylinder of 4 D"].fraction, layers.fraction)
+    assert wall_profiles([]) == {}
 
 
 @pytest.mark.slow
