@@ -234,3 +234,23 @@ def of_wedge_effort(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Ite
             star = scaled(by["fraction"][key], full["fraction"], low)
             here += f", phi* {text(star)}, <C>* {text(scaled(by['contacts'][key], full['contacts']))}"
         yield Compared(subject, "f_align above 0.8", here)
+
+
+def confined(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterator[list[str]]:
+    """Yield a line of headings, and for each packing in cylinders or wedges phi* and <C>* of B16 with their
+    95 % intervals.
+
+    In cylinders phi* is the packing fraction over its value in a periodic box, in wedges 0 at the packing
+    fraction (2.13) of one row, and 1 in a periodic box.
+    """
+    yield ["Lambda", "width, D", "angle", "phi*", "<C>*"]
+    # NaN, the angle of a cylinder, is not equal to itself.
+    for aspect, width, angle in sorted({(one.shape, one.width, f"{one.angle:g}") for one in rows}):
+        some = [one for one in rows if (one.shape, one.width, f"{one.angle:g}") == (aspect, width, angle)]
+        full, fraction, contacts = periodic(free, aspect), of(some, "fraction"), of(some, "contacts")
+        if angle == "nan":
+            star = fraction.over(full["fraction"])
+        else:
+            star = scaled(fraction, full["fraction"], shortest_fraction(aspect, float(angle)))
+        angle = angle.replace("nan", "-")
+        yield [f"{aspect:g}", f"{width:.4g}", angle, text(star), text(scaled(contacts, full["contacts"]))]

@@ -24,7 +24,7 @@ from tisim.plotting.style import empty
 MOST_CONTACTS = 12
 """Number of contacts from which colours do not change."""
 SEGMENT = 8.0
-"""Length (D) of the drawn part of a cylinder."""
+"""Length (D) of the drawn part of a cylinder, and the shortest one of a wedge."""
 DIRECTION_BINS = (8, 20)
 """Bins of the cosine of the polar angle, and of the azimuth, of 4.5 degrees each."""
 ACUTE, LONG = 9.0, 3.0
@@ -75,7 +75,7 @@ def snapshots(
         axis.set_axis_off()
     for axis, (row, bodies) in zip(axes, packings, strict=False):
         unit = float(bodies.diameters()[0])
-        length = SEGMENT * unit if row.study == "cylinder" else np.inf
+        length = unit * {"cylinder": SEGMENT, "wedge": max(SEGMENT, row.width)}.get(row.study, np.inf)
         kept = bodies.position[:, 2] - bodies.low[2] < length
         draw_by_contacts(axis, bodies, kept, container_of(row), length)
         axis.set_title(f"{title(row)}\n$\\phi$ = {row.fraction:.3f}, $C$ = {row.touching:.2f}", fontsize=9)
@@ -99,7 +99,12 @@ def in_wedges(packings: Sequence[Packing]) -> Figure:
     """Draw rods in wedges (B16 Fig. 2.16)."""
     some = [(row, bodies) for row, bodies in firsts(packings) if row.shape <= LONG]
     columns = len({(row.angle, round(row.width / shortest(row.shape, row.angle), 6)) for row, _ in some})
-    return snapshots(some, lambda row: rf"$\Lambda$ = {row.shape:g}, {row.angle:g}°", columns, 2.4, 2.8)
+
+    def title(row: PackedRow) -> str:
+        length = row.width / shortest(row.shape, row.angle)
+        return rf"$\Lambda$ = {row.shape:g}, {row.angle:g}°, {length:.2g} $l_{{w,min}}$"
+
+    return snapshots(some, title, columns, 2.4, 2.8)
 
 
 def of_superballs(packings: Sequence[Packing]) -> Figure:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tisim.analysis.packings.packed_bodies import PackedBodies
 from tisim.backend import runtime
-from tisim.cases.packing.comparisons import compared
+from tisim.cases.packing.comparisons import compared, confined
 from tisim.cases.packing.figures import drawn, starts_of
 from tisim.cases.packing.snapshots import direction_shares
 from tisim.cases.packing.studies import measured_packings, plan_of, plans
@@ -83,6 +83,8 @@ def main():
         print(f"\n{study}: {len(some)} packings")
         rows = sorted((row for row, _ in some), key=PackedRow.place)
         for cells in summary(rows):
+            print("|", " | ".join(cells), "|")
+        for cells in confined(rows, free) if free and study in ("cylinder", "wedge") else ():
             print("|", " | ".join(cells), "|")
         print()
         for line in compared(study, rows, free):

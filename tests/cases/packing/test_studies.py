@@ -7,7 +7,7 @@ import pytest
 
 from tisim.analysis import Mean
 from tisim.analysis.packings.packed_bodies import PackedBodies
-from tisim.cases.packing.comparisons import compared, scaled, shortest_fraction
+from tisim.cases.packing.comparisons import compared, confined, scaled, shortest_fraction
 from tisim.cases.packing.curves import of_cylinders, of_rods, of_superballs, of_wedges
 from tisim.cases.packing.figures import compared_bodies, profile, wall_profiles
 from tisim.cases.packing.measures import contact_counts
@@ -219,6 +219,21 @@ def test_the_summary_has_the_means_of_each_packing_and_the_settings_that_vary():
     assert only[:2] == ["1", "0.6 (one start)"]
     # A mean over no bodies is not a number.
     assert summary([row("aspect ratio", 1.0, held=np.nan), row("aspect ratio", 1.0, 1)])[1][4] == "-"
+
+
+def test_packings_in_cylinders_and_wedges_relative_to_periodic_ones():
+    """By hand: 0.3/0.6, (3 - 2)/(6 - 2), and the range from one row of rods."""
+    free = [row("aspect ratio", 3.0, seed) for seed in (0, 1)]
+    tube = [row("cylinder", 3.0, seed, width=2.0, fraction=0.3, contacts=3.0) for seed in (0, 1)]
+    head, first = confined(tube, free)
+    assert head == ["Lambda", "width, D", "angle", "phi*", "<C>*"]
+    assert first == ["3", "2", "-", "0.5 ± 0", "0.25 ± 0"]
+    low = shortest_fraction(3.0, 9.0)
+    wedge = [row("wedge", 3.0, seed, width=25.0, angle=9.0, fraction=0.6 - seed * 0.1) for seed in (0, 1)]
+    _, only = confined(wedge, free)
+    assert only[:3] == ["3", "25", "9"]
+    assert float(only[3].split()[0]) == pytest.approx((0.55 - low) / (0.6 - low), abs=0.05)
+    assert "±" in only[3]
 
 
 def test_shares_of_directions_in_a_wedge():
