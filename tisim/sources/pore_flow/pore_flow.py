@@ -22,7 +22,7 @@ from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stok
 from tisim.sources.switched import NO_END, Switched
 
 AXIS_NAMES = ("x", "y", "z")
-KEPT_BYTES = 2_000_000_000
+KEPT_BYTES = 1_000_000_000
 """Memory of solved flows that are kept for later scenes of the process, at least one of them."""
 ONE_CELL = (1, 1, 1)
 WHOLE_PERIODS = 1e-9
