@@ -13,6 +13,7 @@ from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.common.runs import grouped
 from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION, lone_fibres
+from tisim.cases.packed_filter.matrix import STEEL_SATURATION
 from tisim.cases.packed_filter.measures import (
     SIZE_CLASSES,
     captured_by,
@@ -90,6 +91,7 @@ def check(starts: int = CHECK_STARTS) -> Iterator[Check | Claim | Shown]:
     coarse = replace(slow, resolution=COMPARED_RESOLUTION)
     yield from of_fibres(coarse, made(coarse))
     yield from of_others(of_slow, made)
+    yield of_magnetisation(slow, starts)
     yield Check("colloids that are neither out, captured nor free", float(missing(every)), 0.0, 0.0)
 
 
@@ -251,3 +253,17 @@ def of_others(results: Sequence[Result], made: Runs) -> Iterator[Shown]:
         twice = np.array([penetration(one) for one in made(stream(SLOW, layers=layers))])
         yield Shown(f"passed, {layers} layers", Mean.of(twice), f"from one: {Mean.of(extrapolated)}")
         yield Shown(f"passed, {layers} layers, minus extrapolated from one", Mean.of(twice - extrapolated))
+
+
+def of_magnetisation(filter: PackedFilter, starts: int) -> Shown:
+    """The change of the magnetisation of fibres by their neighbours (B16 5.6), over saturation."""
+    change = []
+    for seed in range(starts):
+        packed = filter.with_packing(seed)
+        both, alone = (
+            np.array([one.magnetisation for one in made.magnets()[: filter.matrix.number]])
+            for made in (packed, replace(packed, mutual=False))
+        )
+        change.append(float(np.linalg.norm(both - alone, axis=1).mean()) / STEEL_SATURATION)
+    name = "mean change of the magnetisation of a fibre by the others, over saturation"
+    return Shown(name, Mean.of(change))

@@ -3,7 +3,7 @@
 import pytest
 
 from tisim.cases.packed_filter import CASE
-from tisim.cases.packed_filter.checks import of_colloids
+from tisim.cases.packed_filter.checks import of_colloids, of_magnetisation
 from tisim.cases.packed_filter.scene import filter_of
 
 pytestmark = pytest.mark.long
@@ -31,3 +31,11 @@ def test_energies_and_encounters_of_colloids():
     assert found["time in which a colloid of B16's suspension meets another, s"] == pytest.approx(
         8.2e-3, rel=0.01
     )
+
+
+@pytest.mark.slow
+def test_near_neighbours_change_the_magnetisation_more():
+    """Fibres at a solid fraction of 0.2 are twice as near to each other as at 0.025."""
+    dense, dilute = (of_magnetisation(filter_of("small", fraction=part), 2).value for part in (0.2, 0.025))
+    assert 0.08 < dense.value < 0.18
+    assert dilute.value < 0.5 * dense.value

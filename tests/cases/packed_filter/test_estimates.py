@@ -18,6 +18,7 @@ from tisim.cases.packed_filter.measures import (
     missing,
     penetration,
     penetration_of_layers,
+    pressure_drop,
     released_fraction,
 )
 from tisim.cases.packed_filter.scene import PackedFilter, filter_of
@@ -216,3 +217,16 @@ def test_the_picture_shows_captures_before_the_field_is_switched_off(monkeypatch
     lines = {line.get_label(): line.get_ydata() for line in figure.axes[1].lines}
     np.testing.assert_allclose(lines["captured"], [0, 0.6, 0.6, 0.2])
     np.testing.assert_allclose(lines["free, inside"], [1, 0.4, 0.2, 0])
+
+
+def test_pressure_drop_of_an_empty_tube():
+    """Poiseuille: 8 eta Q L / (pi R^4), with Q the speed over the square around the tube times its area."""
+    radius, length, speed = 1e-3, 4e-3, 2e-4
+    tube = PoreFlow(
+        low=(-radius, -radius, 0.0), high=(radius, radius, length), column="tube", cells=(48, 48, 4),
+        speed=speed, viscosity=1e-3,
+    )  # fmt: skip
+    result = SimpleNamespace(scene=SimpleNamespace(effects=[tube]))
+    expected = 8 * 1e-3 * speed * (2 * radius) ** 2 * length / (np.pi * radius**4)
+    assert pressure_drop(result) == pytest.approx(expected, rel=5e-3)
+    assert problem.superficial_velocity(result) == speed
