@@ -69,6 +69,7 @@ def compared(study: Study, rows: Sequence[PackedRow], free: Sequence[PackedRow] 
         "long rods": of_long_rods,
         "longest rods": of_long_rods,
         "moment of inertia": of_inertia,
+        "inertia effort": of_inertia,
         "cylinder": lambda some: of_cylinders(some, free),
         "wedge": lambda some: of_wedges(some, free),
         "superballs": of_superballs,

@@ -171,9 +171,11 @@ def plans(study: Study) -> list[PackedPlan]:
         length = shortest(aspect, angle)
         one = PackedPlan(study, aspect, width=WEDGE_LENGTHS[-1] * length, angle=angle)
         return [one, replace(one, limit=MANY_ATTEMPTS), replace(one, width=LONG_WEDGE * length)]
-    if study == "moment of inertia":
+    if study in ("moment of inertia", "inertia effort"):
+        # B16 has 10,000 attempts.
+        limit = 1000 if study == "moment of inertia" else 10_000
         return [
-            PackedPlan(study, one, inertia=xi, limit=1000, halvings=2)
+            PackedPlan(study, one, inertia=xi, limit=limit, halvings=2)
             for one in INERTIA_ASPECTS
             for xi in INERTIAS
         ]

@@ -22,6 +22,7 @@ Study = Literal[
     "moment of inertia",
     "effort",
     "wedge effort",
+    "inertia effort",
 ]
 STUDIES: tuple[Study, ...] = get_args(Study)
 

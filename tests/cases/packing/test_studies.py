@@ -269,6 +269,10 @@ def test_xi_beside_b16():
     ]
     here = line(compared("moment of inertia", rows), "phi for xi = 0.1 to 10 I, Lambda = 1.5")
     assert here == "3.3 % below the largest, at xi = 0.1 I"
+    few, many = plans("moment of inertia"), plans("inertia effort")
+    assert {one.limit for one in many} == {10_000}
+    assert [replace(one, study="moment of inertia", limit=1000) for one in many] == few
+    assert compared("inertia effort", rows) == compared("moment of inertia", rows)
 
 
 def test_contacts_of_a_row_of_spheres():
