@@ -250,7 +250,7 @@ def _parallel(aspect: float, fraction: float, number: int, seed: int, axis: int,
         if len(found) == number:
             return found
     rule = f"at most {fraction * len(found) / number:.3f} for parallel fibres of L/D = {aspect:g}"
-    must(False, "fraction of fibres", f"{rule}, which find no more places", fraction)
+    must(False, "fraction of fibres", f"{rule}, as {MOST_TRIES} tries found no further free place", fraction)
     raise AssertionError
 
 

@@ -241,8 +241,8 @@ def confined(rows: Sequence[PackedRow], free: Sequence[PackedRow]) -> Iterator[l
     """Yield a line of headings, and for each packing in cylinders or wedges phi* and <C>* of B16 with their
     95 % intervals.
 
-    In cylinders phi* is the packing fraction over its value in a periodic box, in wedges 0 at the packing
-    fraction (2.13) of one row, and 1 in a periodic box.
+    In cylinders phi* is the packing fraction over its value in a periodic box. In wedges it is scaled to be 0
+    at the packing fraction (2.13) of one row of rods, and 1 at the value in a periodic box.
     """
     yield ["Lambda", "width, D", "angle", "phi*", "<C>*"]
     # NaN, the angle of a cylinder, is not equal to itself.

@@ -120,23 +120,23 @@ def compared_bodies(made: Mapping[Study, list[Packing]]) -> dict[str, PackedBodi
 
 
 def wall_profiles(made: list[Packing]) -> dict[str, FractionProfile]:
-    """Return the packing fraction by distance (D) from the wall of the widest cylinders of a study, by
-    title: one for each aspect ratio, the mean of its starts."""
+    """Return the packing fraction by distance (D) from the wall of the widest cylinder of each aspect ratio,
+    by title, as the mean of its starts."""
     found: dict[str, FractionProfile] = {}
-    widest = max((row.width for row, _ in made), default=0.0)
     for shape in sorted({row.shape for row, _ in made}):
+        widest = max(row.width for row, _ in made if row.shape == shape)
         each = [profile(row, one) for row, one in made if row.shape == shape and row.width == widest]
-        if each:
-            title = "spheres" if shape == 1 else f"rods, L/D = {shape - 1:g}"
-            mean = np.mean([one.fraction for one in each], axis=0)
-            found[f"{title} in a cylinder of {widest:g} D"] = each[0]._replace(fraction=mean)
+        title = "spheres" if shape == 1 else f"rods, L/D = {shape - 1:g}"
+        mean = np.mean([one.fraction for one in each], axis=0)
+        found[f"{title} in a cylinder of {widest:g} D"] = each[0]._replace(fraction=mean)
     return found
 
 
 def profile(row: PackedRow, bodies: PackedBodies) -> FractionProfile:
-    """Return the packing fraction of a packing by distance (D) from the walls of its container."""
+    """Return the packing fraction of a packing in a cylinder by distance (D) from the wall."""
     container, unit = container_of(row), float(bodies.diameters()[0])
     assert container is not None
+    assert row.study == "cylinder"
     side, low = bodies.high - bodies.low, bodies.low
     # The box of the start does not grow with the container.
     size = container.box_of(container.volume_in(side, unit), unit)

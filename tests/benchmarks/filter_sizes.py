@@ -57,11 +57,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("parts", nargs="*", metavar="PART", choices=[*PARTS, []], default=list(PARTS))
+    parser.add_argument("parts", nargs="*", metavar="PART", choices=[*PARTS, []], default=[])
     parser.add_argument("--packings", type=int, default=6)
     options = parser.parse_args()
     print(f"{'':34} {'fibres':>6}  {'passed':18} {'captured in 10 mm':18} Pa in 10 mm")
-    for part in options.parts:
+    for part in options.parts or PARTS:
         for name, settings in PARTS[part].items():
             print(f"{name:34} {line(options.packings, **settings)}", flush=True)
 

@@ -154,7 +154,10 @@ def test_a_run_that_ends_by_itself_shows_steps_and_measures(tisim, tmp_path, mon
     command = ("run", "packing", "--size", "small", "--out", "packed")
     code, _, err = tisim(*command, "--frames", "10")
     assert code == 2
-    assert "--frames must be left out for --every, as this run ends by itself" in " ".join(err.split())
+    assert (
+        "--frames must be replaced by --every, the time between frames, as this run ends by itself"
+        in " ".join(err.split())
+    )
     assert not (tmp_path / "packed").exists()
     press_ctrl_c(monkeypatch, after=2)
     code, _, err = tisim(*command)

@@ -1,16 +1,18 @@
 """Scenes that differ in the lengths of their lists run as one batch, with the same bits as alone."""
 
+import pickle
+
 import numpy as np
 import pytest
 
-from tests.engine.test_rows import hung
+from tests.engine.test_rows import Springs, hung
 from tests.scenes import scene
 from tests.sources.fields import fields
-from tisim import Material
+from tisim import InputError, Material
 from tisim.effects import Granular, Hooke, Walls
 from tisim.engine import shared_room
 from tisim.engine.batches import Batches
-from tisim.engine.shared_room import SharedRooms, rows
+from tisim.engine.shared_room import SharedRooms
 from tisim.geometry import Plane, SphericalSurface
 from tisim.sources import Cylinder, MagneticCylinders
 
@@ -43,29 +45,87 @@ def test_room_is_no_part_of_a_scene(rng):
     """A scene with more memory equals itself, and has the same files and digest."""
     one = hung(rng, 5)
     (roomy, _) = SharedRooms().scenes([one, hung(rng, 40)])
-    assert roomy.rooms() == ({"springs": ROOMY},)
-    assert one.rooms() == ({"springs": 32},)
+    assert roomy.rooms() == {"springs": {"springs": ROOMY}}
+    assert one.rooms() == {"springs": {"springs": 32}}
     assert roomy == one
+    assert pickle.loads(pickle.dumps(roomy)).rooms() == roomy.rooms()
     assert roomy.digest() == one.digest()
     assert roomy.to_toml() == one.to_toml()
     assert roomy.replace({"effects.springs.share": 2.0}).rooms() == one.rooms()
+    without = roomy.model_copy(update={"effects": ()})
+    assert (without.rooms(), without.acting()) == ({}, ())
+
+
+def sizes(scenes):
+    """Rows of springs in memory, of four numbers each."""
+    return [one.room_size() // 4 for one in scenes]
 
 
 def test_much_empty_memory_is_not_shared(rng, monkeypatch):
-    """Few short lists beside a long one are another batch if more than half of the memory would be empty."""
+    """Scenes are put into groups, in each of which at most half of the memory is empty."""
     short, long = [hung(rng, 5) for _ in range(3)], hung(rng, 200)
-    assert [rows(one.rooms()) for one in (*short, long)] == [32, 32, 32, 256]
-    assert {rows(one.rooms()) for one in SharedRooms().scenes([*short, long])} == {256}
-    monkeypatch.setattr(shared_room, "SPARE_ROWS", 100)
+    assert sizes([*short, long]) == [32, 32, 32, 256]
+    assert set(sizes(SharedRooms().scenes([*short, long]))) == {256}
+    monkeypatch.setattr(shared_room, "SPARE_NUMBERS", 400)
     kept = SharedRooms()
-    assert [rows(one.rooms()) for one in kept.scenes([*short, long])] == [32, 32, 32, 256]
-    assert {rows(one.rooms()) for one in kept.scenes([short[0], *[long] * 3])} == {256}
+    assert sorted(sizes(kept.scenes([*short, long]))) == [32, 32, 256, 256]
+    assert set(sizes(kept.scenes([short[0], *[long] * 3]))) == {256}
     # The memory of an earlier batch would be too much for this one.
-    assert [rows(one.rooms()) for one in kept.scenes(short)] == [32, 32, 32]
+    assert sizes(kept.scenes(short)) == [32, 32, 32]
+    every = [hung(rng, number) for number in (20, 40, 70, 140, 300, 500)]
+    assert sizes(every) == [32, 64, 128, 256, 512, 512]
+    found = sizes(kept.scenes(every))
+    assert len(set(found)) == 2
+    for size in set(found):
+        group = [own for own, given in zip(sizes(every), found, strict=True) if given == size]
+        assert size * len(group) <= max(2 * sum(group), 100)
 
 
-def test_rows_bound_the_worlds_of_a_batch(rng, monkeypatch):
-    monkeypatch.setattr("tisim.engine.batches.BATCH_ROWS", 150)
+def test_rooms_are_kept_for_later_batches(rng):
+    kept = SharedRooms()
+    for number in (200, 5, 70):
+        assert sizes(kept.scenes([hung(rng, number)])) == [256]
+    assert sizes(kept.scenes([hung(rng, 300)])) == [512]
+
+
+def test_octrees_count_as_memory(rng):
+    """A row of the octree of a fibre has some thousand numbers."""
+    few, many = magnet(rng, 10), magnet(rng, 40)
+    assert many.room_size() > 1.9 * few.room_size() > 32 * 3000
+    assert few.room_size() == len(few.derived_rows()["cells"]) + 32 * sum(n for _, n in Cylinder.columns())
+
+
+class ShortRows(Springs):
+    """Springs with derived rows as long as their list."""
+
+    def derived_rows(self):
+        return {"own": [0.0] * len(self.springs)}
+
+
+def test_own_parts_whose_rows_ignore_the_memory_are_refused(rng):
+    springs = [hung(rng, number).effects[0].springs for number in (5, 40)]
+    scenes = [
+        scene(np.zeros((1, 3)), np.zeros((1, 3)), (ShortRows(springs=one),), mass=1.0, dt=0.5)
+        for one in springs
+    ]
+    with pytest.raises(
+        InputError, match=r"^parameters with lists and derived_rows must be \d+ numbers, as in"
+    ):
+        dict(Batches().run(scenes))
+
+
+def magnet(rng, number):
+    """Random fibres with a sum by cells."""
+    cylinders = [
+        Cylinder(centre=rng.uniform(-5, 5, 3), axis=rng.normal(size=3), radius=0.2, length=2.0,
+                 magnetisation=rng.normal(size=3) * 1e6)
+        for _ in range(number)
+    ]  # fmt: skip
+    return MagneticCylinders(cylinders=cylinders, sum_digits=2)
+
+
+def test_numbers_bound_the_worlds_of_a_batch(rng, monkeypatch):
+    monkeypatch.setattr("tisim.engine.batches.BATCH_NUMBERS", 600)
     batches = Batches()
     results = dict(batches.run([hung(rng, 40)] * 3))
     assert [results[k].status.ok for k in range(3)] == [True] * 3
@@ -93,15 +153,7 @@ def test_walls_keep_their_own_memory():
 def test_sums_by_cells_in_a_larger_memory(rng):
     """The octree of ten fibres is the same beside one of two hundred."""
 
-    def made(number):
-        cylinders = [
-            Cylinder(centre=rng.uniform(-5, 5, 3), axis=rng.normal(size=3), radius=0.2, length=2.0,
-                     magnetisation=rng.normal(size=3) * 1e6)
-            for _ in range(number)
-        ]  # fmt: skip
-        return MagneticCylinders(cylinders=cylinders, sum_digits=2)
-
-    few, many = made(10), made(200)
+    few, many = magnet(rng, 10), magnet(rng, 200)
     roomy = few.with_room(many.room())
     assert few.structure() != roomy.structure() == many.structure()
     points = rng.uniform(-5, 5, (2, 100, 3))

@@ -230,7 +230,8 @@ class Component(Checked):
     @classmethod
     def list_capacity(cls, rows: int) -> int:
         """Return the capacity of a list for this number of rows of this class. Capacities are rounded up, so
-        that scenes with lists of similar lengths can run in one batch."""
+        that scenes with lists of similar lengths can run in one batch. A part whose lists may have more
+        memory than they need reads it from ``room``."""
         return max(cls.least_rows, 1 << (rows - 1).bit_length())
 
     def needed_room(self) -> dict[str, int]:
@@ -243,6 +244,11 @@ class Component(Checked):
         given: Mapping[str, int] = self.__dict__.get("_room", {})
         needed = self.needed_room()
         return {name: max(rows, given.get(name, 0)) if rows else 0 for name, rows in needed.items()}
+
+    def room_size(self) -> int:
+        """Return the numbers that kernels may read of the lists of this part, in each world."""
+        room = self.room()
+        return sum(room[name] * sum(size for _, size in kind.columns()) for name, kind in self.lists())
 
     def with_room(self, rows: Mapping[str, int]) -> Self:
         """Return a copy with memory for at least this number of rows in the lists of these names, so that it

@@ -15,7 +15,7 @@ from tisim.console import shown_progress
 from tisim.engine.crowding import check_places
 from tisim.engine.observer import Observer
 from tisim.engine.result import Result, Status
-from tisim.engine.shared_room import SharedRooms, rows
+from tisim.engine.shared_room import SharedRooms
 from tisim.engine.simulation import Simulation
 from tisim.errors import InputError, must
 from tisim.scene.initial_state import Arrays
@@ -33,11 +33,11 @@ IDLE_SIMULATIONS = 8
 SPARE, WASTE = 4096, 8
 """A kept simulation is reused only if its total capacity is at most SPARE particles, or WASTE times the
 capacity needed, because all of it is loaded and checked."""
-FEW_WORLDS, FEW_ROWS = 8, 50_000
-"""A small scene, with at most ``FEW_ROWS`` rows in its lists, is compiled for ``FEW_WORLDS`` worlds, because
-a few more worlds of it are often run later."""
-BATCH_ROWS = 50_000_000
-"""Largest number of rows in the lists of all worlds of a batch; it bounds the memory to some GB."""
+FEW_WORLDS, FEW_NUMBERS = 8, 100_000
+"""A small scene, with at most ``FEW_NUMBERS`` in its lists, is compiled for ``FEW_WORLDS`` worlds, because a
+few more worlds of it are often run later."""
+BATCH_NUMBERS = 200_000_000
+"""Most numbers in the lists of all worlds of a batch, 1.6 GB."""
 
 Progress = Callable[[float], None]
 
@@ -52,7 +52,7 @@ def progress_of_part(progress: Progress, finished_parts: int, parts: int) -> Pro
 
 class Batches:
     """Batches runs scenes and yields their results; scenes of one structure (effects, options, domain,
-    stepper) run side by side, also with lists of different lengths.
+    stepper) run side by side. Most lists, such as the fibres of a magnet, may have different lengths.
 
     limit : the largest number of worlds of a batch.
 
@@ -128,14 +128,14 @@ class Batches:
 
         least : number of worlds that it has at least, whatever the limits of a batch.
         """
-        capacity, room = max(scene.capacity() for scene in scenes), max(1, rows(scenes[0].rooms()))
-        worlds = min(len(scenes), max(least, self._most(capacity, room)))
-        simulation = self._reusable(structure, worlds, capacity)
+        capacity, numbers = max(scene.capacity() for scene in scenes), max(1, scenes[0].room_size())
+        worlds = min(len(scenes), max(least, self._most(capacity, numbers)))
+        simulation = self._reusable(structure, worlds, capacity, numbers)
         if simulation is None:
             _restart_taichi()
             capacity = rounded(capacity)
-            few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE and room <= FEW_ROWS else 1
-            worlds = min(max(few, rounded(worlds)), max(least, self._most(capacity, room)))
+            few = FEW_WORLDS if FEW_WORLDS * capacity <= SPARE and numbers <= FEW_NUMBERS else 1
+            worlds = min(max(few, rounded(worlds)), max(least, self._most(capacity, numbers)))
             simulation = Simulation(scenes[0], worlds, capacity)
         try:
             yield simulation
@@ -146,13 +146,18 @@ class Batches:
             for each in old:
                 each.close()
 
-    def _most(self, capacity: int, room: int) -> int:
-        """Return the largest number of worlds of a batch for a capacity and rows in the lists of a world."""
-        return min(self.limit, BATCH_PARTICLES // capacity, max(1, BATCH_ROWS // room))
+    def _most(self, capacity: int, numbers: int) -> int:
+        """Return the largest number of worlds of a batch for a capacity and the numbers in the lists of a
+        world."""
+        return min(self.limit, BATCH_PARTICLES // capacity, max(1, BATCH_NUMBERS // numbers))
 
-    def _reusable(self, structure: Any, worlds: int, capacity: int) -> Simulation | None:
-        """Take the smallest suitable simulation out of the idle ones; return None if none is suitable."""
+    def _reusable(self, structure: Any, worlds: int, capacity: int, numbers: int) -> Simulation | None:
+        """Take the smallest suitable simulation out of the idle ones; return None if none is suitable.
+
+        numbers : in the lists of a world, which are the same in all simulations of a structure.
+        """
         most = max(SPARE, WASTE * worlds * capacity)
+        most_worlds = max(FEW_WORLDS * FEW_NUMBERS // numbers, WASTE * worlds)
         with _lock:
             self._idle = [each for each in self._idle if each.s.alive]
             serve = [
@@ -162,6 +167,7 @@ class Batches:
                 and each.worlds >= worlds
                 and each.s.capacity >= capacity
                 and each.worlds * each.s.capacity <= most
+                and each.worlds <= most_worlds
             ]
             if not serve:
                 return None

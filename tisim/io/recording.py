@@ -141,8 +141,9 @@ def check_frames(scene: Scene, frames: int | None, name: str, other: str) -> Non
     """Raise InputError for a number of frames if a run ends by itself. name, other : of the settings in
     messages."""
     rule = (
-        f"left out for {other}, as this run ends by itself long before its duration of {scene.duration:.3g} s"
+        f"replaced by {other}, the time between frames, as this run ends by itself long before its duration"
     )
+    rule += f" of {scene.duration:.3g} s"
     must(frames is None or not scene.stepper.ends, name, rule, frames)
 
 

@@ -19,7 +19,7 @@ from tisim.errors import must
 from tisim.plotting.style import AXIS_COLOURS, empty, letters, plain
 
 RATTLER_GAPS = np.logspace(-6, -2, 9)
-"""Gaps (D) up to which bodies are in contact, for the part of rattlers."""
+"""Largest gaps (D) of contacts, for the fraction of rattlers."""
 CRYSTALS = {
     "fcc": (0.191, 0.575),
     "hcp": (0.097, 0.485),
@@ -104,8 +104,8 @@ def structure(packings: Mapping[str, PackedBodies], spacing: float = 0.1, reach:
 def order(
     packings: Mapping[str, PackedBodies], profiles: Mapping[str, FractionProfile] | None = None
 ) -> Figure:
-    """Draw how packings are held and how far they are from order: the part of rattlers by the gap up to which
-    bodies count as in contact, the bond order q_4 and q_6 of each body beside crystals, and packing fractions
+    """Draw how packings are held and how far they are from order: the fraction of rattlers by the largest gap
+    of a contact, the bond order q_4 and q_6 of each body beside crystals, and packing fractions
     by distance from a wall.
 
     packings : by title, periodic along all axes. profiles : by title, with distances in D.
@@ -125,7 +125,7 @@ def order(
     for name, place in CRYSTALS.items():
         bonds.plot(*place, "k+", ms=9)
         bonds.annotate(name, place, xytext=(5, 4), textcoords="offset points", fontsize=8)
-    loose.set(xlabel="gap up to which bodies touch over D", ylabel="part of rattlers")
+    loose.set(xlabel="largest gap of a contact over D", ylabel="fraction of rattlers")
     loose.set_ylim(bottom=0)
     loose.legend(frameon=False, fontsize=8)
     bonds.set(xlabel="bond order $q_4$ of a body", ylabel="$q_6$")

@@ -193,22 +193,25 @@ class Scene(Component, ShownInNotebook):
         parts = (*self._roomy(self.effects), self.domain, self.stepper)
         return *(part.structure() for part in parts), tuple(self.materials)
 
-    def rooms(self) -> tuple[Mapping[str, int], ...]:
-        """Return, for each effect, the number of rows for which each of its lists has memory, by name."""
-        return tuple(effect.room() for effect in self._roomy(self.effects))
+    def rooms(self) -> dict[str, dict[str, int]]:
+        """Return, for each effect by its label, the number of rows for which each of its lists has memory, by
+        name."""
+        return {effect.label: effect.room() for effect in self._roomy(self.effects)}
 
-    def with_rooms(self, rows: Sequence[Mapping[str, int]]) -> Self:
-        """Return a copy that has, for each effect, memory for at least these rows of its lists, by name."""
+    def room_size(self) -> int:
+        return sum(effect.room_size() for effect in self._roomy(self.effects))
+
+    def with_rooms(self, rows: Mapping[str, Mapping[str, int]]) -> Self:
+        """Return a copy whose effects have memory for at least these rows of their lists, by label and
+        name."""
         made = self.model_copy()
-        made.__dict__["_room"] = tuple(rows)
+        made.__dict__["_rooms"] = {label: dict(lists) for label, lists in rows.items()}
         return made
 
     def _roomy(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
         """Return the effects with the memory of the scene for their lists."""
-        room = self.__dict__.get("_room")
-        if room is None:
-            return tuple(effects)
-        return tuple(effect.with_room(rows) for effect, rows in zip(effects, room, strict=True))
+        rooms: Mapping[str, Mapping[str, int]] = self.__dict__.get("_rooms", {})
+        return tuple(one.with_room(rooms[one.label]) if one.label in rooms else one for one in effects)
 
     def acting(self) -> tuple[Effect, ...]:
         """Return the effects, completed by data of the initial state, the materials and each other."""

@@ -156,7 +156,10 @@ class ParameterTable:
         table = np.ones((self.field.shape[0], max(1, self.slots)))
         for world, parts in enumerate(rows):
             blocks = [values for part in parts for _, values in _entries(part, part.label)]
-            table[world, : self.slots] = np.concatenate(blocks) if blocks else ()
+            row = np.concatenate(blocks) if blocks else np.empty(0)
+            rule = f"{self.slots} numbers, as in other scenes of this structure (see Component.room)"
+            must(len(row) == self.slots, "parameters with lists and derived_rows", rule, len(row))
+            table[world, : self.slots] = row
         real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
         with np.errstate(over="ignore", under="ignore"):
             rounded = table.astype(real)

@@ -22,6 +22,7 @@ from tisim.cases.packed_filter.measures import (
     released_fraction,
 )
 from tisim.cases.packed_filter.scene import PackedFilter, filter_of
+from tisim.engine.shared_room import SharedRooms
 from tisim.sources import Cylinder, MagneticCylinders, MagneticField, PoreFlow
 from tisim.sources.switched import NO_END
 
@@ -175,6 +176,17 @@ def test_designs_have_enough_fibres_and_cells():
     assert first.matrix.sides[0] >= 2 * (first.matrix.length + first.matrix.diameter)
     faster = problem.designed({**high, "speed": 1e-3}, 0, **problem.SEARCHED["small"])
     assert faster.duration == pytest.approx(second.duration * problem.SPEED / 1e-3)
+
+
+@pytest.mark.slow
+def test_a_generation_of_filters_is_one_batch():
+    """Designs with different numbers of fibres and of cells of their flows get the same memory."""
+    low = {"diameter": 0.8e-3, "aspect": 1.5, "fraction": 0.05, "flux": 0.1}
+    designs = [low, {**low, "aspect": 3.0, "fraction": 0.2}, {**low, "aspect": 5.0, "fraction": 0.3}]
+    scenes = [problem.problem("small").scene(one, k) for k, one in enumerate(designs)]
+    assert len({len(one.effects[1].cylinders) for one in scenes}) == 3
+    assert len({one.structure() for one in scenes}) > 1
+    assert len({one.structure() for one in SharedRooms().scenes(scenes)}) == 1
 
 
 def test_figure_of_estimates_and_its_table():

@@ -81,8 +81,8 @@ def test_parallel_fibres_do_not_overlap(axis):
 
 def test_matrices_of_parallel_fibres_that_are_refused(monkeypatch):
     monkeypatch.setattr("tisim.cases.packed_filter.matrix.MOST_TRIES", 5000)
-    rule = r"^fraction of fibres must be at most 0\.3\d+ for parallel fibres of L/D = 2, which find no more "
-    with pytest.raises(InputError, match=rule + "places; received 0.7"):
+    rule = r"^fraction of fibres must be at most 0\.3\d+ for parallel fibres of L/D = 2, as 5000 tries "
+    with pytest.raises(InputError, match=rule + "found no further free place; received 0.7"):
         Matrix(aspect=2.0, fraction=0.7, parallel="y").fibres()
     with pytest.raises(InputError, match=r"^tube must be left out with parallel fibres; received 2"):
         Matrix(tube=2.0, parallel="y").fibres()

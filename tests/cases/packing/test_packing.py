@@ -34,7 +34,7 @@ def test_the_pictures_of_a_run(tmp_path):
     """Bodies are drawn by their shapes, and bars count all of them; an ended packing lacks no frames."""
     scene = of_shape(rod(2.0), "small", 0, number=40, attempts=20, step=4.0)
     path = tmp_path / "trajectory.h5"
-    rule = r"^frames must be left out for every, as this run ends by itself long before .*; received 3$"
+    rule = r"^frames must be replaced by every, the time between frames, as this run ends by .*; received 3$"
     with pytest.raises(InputError, match=rule):
         run(scene, record=Recording(path, frames=3))
     assert not path.exists()

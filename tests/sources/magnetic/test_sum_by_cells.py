@@ -154,23 +154,19 @@ def test_beside_an_independent_library(rng):
 def test_a_full_list_of_near_cylinders(rng, monkeypatch):
     """Leaves whose near cylinders have no room sum all cylinders directly."""
     cylinders = fibres(rng, 10)
-    for kept in (cell_sum._octree, cell_sum._cell_row):
-        kept.cache_clear()
+    cell_sum._octree.cache_clear()
     monkeypatch.setattr(cell_sum, "NEAR_PER_LEAF", 1)
     assert max(errors(cylinders, about(rng, cylinders), sum_digits=3)) < 1e-3
-    for kept in (cell_sum._octree, cell_sum._cell_row):
-        kept.cache_clear()
+    cell_sum._octree.cache_clear()
 
 
 @pytest.mark.slow
 def test_tolerances_are_lowered_until_the_error_is_small(rng, monkeypatch):
     cylinders = fibres(rng, 10)
-    for kept in (cell_sum._octree, cell_sum._cell_row):
-        kept.cache_clear()
+    cell_sum._octree.cache_clear()
     monkeypatch.setattr(cell_sum, "FIRST_TOLERANCE", 3.0)
     assert max(errors(cylinders, about(rng, cylinders), sum_digits=3)) < 1e-3
-    for kept in (cell_sum._octree, cell_sum._cell_row):
-        kept.cache_clear()
+    cell_sum._octree.cache_clear()
     monkeypatch.setattr(cell_sum, "TRIES", 1)
     with pytest.raises(InputError, match=r"^sum_digits must be fewer for these cylinders in f(32|64);"):
         errors(cylinders, about(rng, cylinders), sum_digits=3)

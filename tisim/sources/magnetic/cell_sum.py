@@ -44,6 +44,12 @@ def _numbers(cylinders: int) -> tuple[int, int, int]:
     return (8 * leaves) // 7 + 1, leaves, NEAR_PER_LEAF * leaves
 
 
+def row_size(cylinders: int, digits: int) -> int:
+    """Return the length of a packed row for a list of this capacity."""
+    nodes, leaves, listed = _numbers(cylinders)
+    return 4 + nodes + (2 + solid_harmonics.number(DEGREES[digits])) * leaves + listed
+
+
 def _region(cylinders: Sequence[Cylinder]) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower and the upper corner (m) of the box about all cylinders."""
     centre, axis = np.array([c.centre for c in cylinders]), np.array([c.direction for c in cylinders])
@@ -106,17 +112,11 @@ def cell_row(
     box : corners of the box in which the sum is wanted, m; if not given, twice the box about all cylinders.
     room : number of cylinders for which the row has room, if more than these.
     """
-    return _cell_row(tuple(cylinders), digits, box, room, runtime.current())
-
-
-@lru_cache(maxsize=KEPT_OCTREES)
-def _cell_row(
-    cylinders: tuple[Cylinder, ...], digits: int, box: Corners | None, room: int, settings: runtime.Runtime
-) -> np.ndarray:
     needed = Cylinder.list_capacity(len(cylinders))
     # Limits are those of a world alone, so that its sum is the same to the last bit in every batch.
     sizes, most_listed = _numbers(max(needed, room)), _numbers(needed)[2]
-    return _packed(_octree(cylinders, digits, box, settings), DEGREES[digits], sizes, most_listed)
+    tree = _octree(tuple(cylinders), digits, box, runtime.current())
+    return _packed(tree, DEGREES[digits], sizes, most_listed)
 
 
 @lru_cache(maxsize=KEPT_OCTREES)

@@ -11,7 +11,7 @@ from tisim.backend.taichi import ti
 from tisim.effects.base import Effect, option
 from tisim.errors import must
 from tisim.sources.base import add_point
-from tisim.sources.magnetic.cell_sum import CellSum, Corners, cell_row
+from tisim.sources.magnetic.cell_sum import CellSum, Corners, cell_row, row_size
 from tisim.sources.magnetic.cylinder_body import Cylinder
 from tisim.sources.magnetic.cylinder_end import ClosedEnds
 from tisim.sources.magnetic.cylinder_table import TabulatedEnds, table
@@ -127,6 +127,10 @@ class MagneticCylinders(Magnets):
 
     def lookups(self) -> dict[str, np.ndarray]:
         return {} if self.table_digits is None else {"table": table(self.table_digits)[0]}
+
+    def room_size(self) -> int:
+        digits = self.sum_digits
+        return super().room_size() + (row_size(self.room()["cylinders"], digits) if digits else 0)
 
     def derived_rows(self) -> Mapping[str, Sequence[float] | np.ndarray]:
         rows = dict(super().derived_rows())

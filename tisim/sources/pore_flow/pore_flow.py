@@ -22,8 +22,11 @@ from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stok
 from tisim.sources.switched import NO_END, Switched
 
 AXIS_NAMES = ("x", "y", "z")
-KEPT_BYTES = 1_000_000_000
-"""Memory of solved flows that are kept for later scenes of the process, at least one of them."""
+KEPT_BYTES = 1_600_000_000
+"""Memory of solved flows that are kept for later scenes of the process, at least one of them. Each scene of a
+batch asks for its flow several times, so that it is that of the largest batch."""
+NUMBERS_PER_CELL = 4
+"""Three components of the velocity, and the distance from the nearest surface."""
 ONE_CELL = (1, 1, 1)
 WHOLE_PERIODS = 1e-9
 """Relative rounding of the number of periods of the flow in a domain."""
@@ -41,6 +44,11 @@ class UnitFlow(NamedTuple):
     distance: np.ndarray
     mean: np.ndarray
     permeability: float
+
+    @property
+    def nbytes(self) -> int:
+        """Return the memory of the arrays."""
+        return self.velocity.nbytes + self.distance.nbytes
 
 
 _solved: OrderedDict[tuple[Any, ...], UnitFlow] = OrderedDict()
@@ -185,7 +193,7 @@ class PoreFlow(Switched):
             distance = flow.grid.distances(None, solids) / self.shortest_length()
             _solved[key] = UnitFlow(velocity, distance, flow.mean_velocity / along, flow.permeability)
         _solved.move_to_end(key)
-        while len(_solved) > 1 and sum(one.velocity.nbytes for one in _solved.values()) > KEPT_BYTES:
+        while len(_solved) > 1 and sum(one.nbytes for one in _solved.values()) > KEPT_BYTES:
             _solved.popitem(last=False)
         return _solved[key]
 
@@ -232,6 +240,9 @@ class PoreFlow(Switched):
 
     def needed_room(self) -> dict[str, int]:
         return {**super().needed_room(), "grid": rounded(math.prod(self._grid.shape))}
+
+    def room_size(self) -> int:
+        return super().room_size() + NUMBERS_PER_CELL * self.room()["grid"]
 
     def structure(self) -> tuple[Any, ...]:
         return super(PoreFlow, self.with_room(self.room()).model_copy(update={"cells": ONE_CELL})).structure()
