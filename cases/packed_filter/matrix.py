@@ -49,7 +49,7 @@ STEEL_SATURATION = 2.2e6
 """Saturation magnetisation of the fibres, A/m (B16 section 7.3.4)."""
 IMAGE_REACH = 1.0
 """Distance from the matrix up to which there are fibres, in lengths of a fibre."""
-MOST_TRIES = 200_000
+MOST_PLACES_TRIED = 200_000
 """Random places that are tried for parallel fibres."""
 CLEAR = 1.001
 """Colloids start outside the fibres, enlarged by this factor."""
@@ -243,14 +243,19 @@ def _parallel(aspect: float, fraction: float, number: int, seed: int, axis: int,
     generator = np.random.default_rng([seed, 0x9A2A11E1])
     across = [b for b in range(3) if b != axis]
     found = np.empty((0, 3))
-    for place in generator.uniform(size=(MOST_TRIES, 3)):
+    for place in generator.uniform(size=(MOST_PLACES_TRIED, 3)):
         away = side * np.abs((found - place + 0.5) % 1 - 0.5)
         if ((np.hypot(*away[:, across].T) > 1) | (away[:, axis] > aspect)).all():
             found = np.vstack([found, place])
         if len(found) == number:
             return found
     rule = f"at most {fraction * len(found) / number:.3f} for parallel fibres of L/D = {aspect:g}"
-    must(False, "fraction of fibres", f"{rule}, as {MOST_TRIES} tries found no further free place", fraction)
+    must(
+        False,
+        "fraction of fibres",
+        f"{rule}, as {MOST_PLACES_TRIED} tries found no further free place",
+        fraction,
+    )
     raise AssertionError
 
 

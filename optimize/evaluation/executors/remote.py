@@ -116,7 +116,9 @@ def units(scenes: Sequence[Scene], workers: int) -> list[list[int]]:
     """Return the indices of the scenes of each unit of work; its scenes have one structure apart from the
     lengths of lists, so they run side by side."""
     groups: dict[Any, list[int]] = {}
-    for index, scene in enumerate(SharedRooms().scenes(scenes)):
+    # Calls of functions in place of scenes have no lists.
+    are_scenes = all(isinstance(scene, Scene) for scene in scenes)
+    for index, scene in enumerate(SharedRooms().scenes(scenes) if are_scenes else scenes):
         groups.setdefault(scene.structure(), []).append(index)
     size = max(1, -(-len(scenes) // (UNITS * max(1, workers))))
     return [group[k : k + size] for group in groups.values() for k in range(0, len(group), size)]

@@ -80,7 +80,7 @@ def test_parallel_fibres_do_not_overlap(axis):
 
 
 def test_matrices_of_parallel_fibres_that_are_refused(monkeypatch):
-    monkeypatch.setattr("tisim.cases.packed_filter.matrix.MOST_TRIES", 5000)
+    monkeypatch.setattr("tisim.cases.packed_filter.matrix.MOST_PLACES_TRIED", 5000)
     rule = r"^fraction of fibres must be at most 0\.3\d+ for parallel fibres of L/D = 2, as 5000 tries "
     with pytest.raises(InputError, match=rule + "found no further free place; received 0.7"):
         Matrix(aspect=2.0, fraction=0.7, parallel="y").fibres()

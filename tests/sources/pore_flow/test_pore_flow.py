@@ -183,7 +183,7 @@ def test_flows_of_one_matrix_are_solved_once(monkeypatch):
     for other in (flow(direction=(0, 1, 0)), flow(spheres=()), flow(cells=(16, 14, 16))):
         other.solve()
     assert len(solutions) == 4
-    monkeypatch.setattr(pore_flow, "KEPT_BYTES", 1)
+    monkeypatch.setattr(pore_flow, "KEPT_FLOW_BYTES", 1)
     flow(tolerance=1e-3).solve()
     assert len(pore_flow._solved) == 1
 

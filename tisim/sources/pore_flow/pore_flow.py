@@ -22,7 +22,7 @@ from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stok
 from tisim.sources.switched import NO_END, Switched
 
 AXIS_NAMES = ("x", "y", "z")
-KEPT_BYTES = 1_600_000_000
+KEPT_FLOW_BYTES = 1_600_000_000
 """Memory of solved flows that are kept for later scenes of the process, at least one of them. Each scene of a
 batch asks for its flow several times, so that it is that of the largest batch."""
 NUMBERS_PER_CELL = 4
@@ -193,7 +193,7 @@ class PoreFlow(Switched):
             distance = flow.grid.distances(None, solids) / self.shortest_length()
             _solved[key] = UnitFlow(velocity, distance, flow.mean_velocity / along, flow.permeability)
         _solved.move_to_end(key)
-        while len(_solved) > 1 and sum(one.nbytes for one in _solved.values()) > KEPT_BYTES:
+        while len(_solved) > 1 and sum(one.nbytes for one in _solved.values()) > KEPT_FLOW_BYTES:
             _solved.popitem(last=False)
         return _solved[key]
 
