@@ -351,6 +351,7 @@ def test_a_blocked_matrix_is_refused_before_a_run():
         simulate([drifting(flow(cylinders=(plug,)))], capacity=4)
 
 
+@pytest.mark.slow
 def test_grids_of_one_cell_and_places_that_are_no_numbers(rng):
     """A matrix that does not change along z needs one cell there; other memory is not read for a NaN."""
     through = Cylinder(centre=(0.2 * MM, 0.7 * MM, 3.0 * MM), axis=(0, 0, 1), radius=0.35 * MM, length=9 * MM)
