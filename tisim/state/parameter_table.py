@@ -153,23 +153,22 @@ class ParameterTable:
 
         InputError is raised for a value that the precision cannot hold, or that kernels would flush to zero.
         """
-        table = np.ones((self.field.shape[0], max(1, self.slots)))
+        real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
+        table = np.ones((self.field.shape[0], max(1, self.slots)), real)
         for world, parts in enumerate(rows):
-            blocks = [values for part in parts for _, values in _entries(part, part.label)]
-            row = np.concatenate(blocks) if blocks else np.empty(0)
+            entries = [entry for part in parts for entry in _entries(part, part.label)]
+            row = np.concatenate([values for _, values in entries]) if entries else np.empty(0)
             rule = f"{self.slots} numbers, as in other scenes of this structure (see Component.room)"
             must(len(row) == self.slots, "parameters with lists and derived_rows", rule, len(row))
-            table[world, : self.slots] = row
-        real, precision = (np.float64, "f64") if self.field.dtype == ti.f64 else (np.float32, "f32")
-        with np.errstate(over="ignore", under="ignore"):
-            rounded = table.astype(real)
-        flushed = (table != 0) & (np.abs(rounded) < np.finfo(real).tiny)
-        for world, slot in np.argwhere(~np.isfinite(rounded) | flushed):
-            entries = [entry for part in rows[world] for entry in _entries(part, part.label)]
-            ends = np.cumsum([len(values) for _, values in entries])
-            name = entries[int(np.searchsorted(ends, slot, side="right"))][0]
-            must(False, name, f"within the range of {precision}", float(table[world, slot]))
-        self._put(rounded)
+            with np.errstate(over="ignore", under="ignore"):
+                table[world, : self.slots] = row
+            held = table[world, : self.slots]
+            flushed = (row != 0) & (np.abs(held) < np.finfo(real).tiny)
+            for slot in np.flatnonzero(~np.isfinite(held) | flushed):
+                ends = np.cumsum([len(values) for _, values in entries])
+                name = entries[int(np.searchsorted(ends, slot, side="right"))][0]
+                must(False, name, f"within the range of {precision}", float(row[slot]))
+        self._put(table)
 
     @in_taichi_thread
     def _put(self, values: np.ndarray) -> None:

@@ -22,9 +22,9 @@ from tisim.sources.pore_flow.stokes_flow import TOLERANCES, WALL_TOLERANCE, stok
 from tisim.sources.switched import NO_END, Switched
 
 AXIS_NAMES = ("x", "y", "z")
-KEPT_FLOW_BYTES = 1_600_000_000
+KEPT_FLOW_BYTES = 1_200_000_000
 """Memory of solved flows that are kept for later scenes of the process, at least one of them. Each scene of a
-batch asks for its flow several times, so that it is that of the largest batch."""
+batch asks for its flow several times, so the flows of a batch should fit; others are solved again."""
 NUMBERS_PER_CELL = 4
 """Three components of the velocity, and the distance from the nearest surface."""
 ONE_CELL = (1, 1, 1)
