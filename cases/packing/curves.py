@@ -125,8 +125,9 @@ def of_superballs(rows: Sequence[PackedRow]) -> Figure:
         axes[2].axhline(order, color=colour, lw=0.8, ls=":")
     for axis, title in zip(axes, ("packing fraction", "mean contact number", "order"), strict=True):
         axis.set_ylabel(title)
-        axis.set_ylim(0.55 if title == "packing fraction" else 0, None)
+        axis.set_ylim(bottom=0)
         axis.legend(frameon=False, fontsize=8)
+    axes[0].set_ylim(bottom=min(0.55, min(one.fraction for one in rows) - 0.02))
     letters(axes)
     return figure
 

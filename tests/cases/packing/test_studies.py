@@ -200,6 +200,8 @@ def test_rods_and_superballs_beside_b16():
     assert line(found, "densest exponent").startswith("3, 0.61")
     assert line(found, "contact number up to 1e-4 D, exponent 5").startswith("6.2")
     assert len(of_superballs(balls).axes) == 3
+    # Loose packings of few attempts are inside the axes, too.
+    assert of_superballs([replace(one, fraction=0.4) for one in balls]).axes[0].get_ylim()[0] < 0.4
 
 
 def test_the_summary_has_the_means_of_each_packing_and_the_settings_that_vary():
