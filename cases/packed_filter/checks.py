@@ -12,6 +12,7 @@ from tisim.analysis import Mean
 from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.common.runs import grouped
+from tisim.cases.concentration.scene import DIFFUSION as CONTACT_DIFFUSION
 from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION, lone_fibres
 from tisim.cases.packed_filter.matrix import STEEL_SATURATION
 from tisim.cases.packed_filter.measures import (
@@ -122,6 +123,13 @@ def of_colloids(filter: PackedFilter) -> Iterator[Shown]:
     box = filter.box()
     here = filter.number / float(np.prod(np.subtract(box.high, box.low)))
     yield Shown("mean distance of colloids here over B16's", float(np.cbrt(number / here)))
+    # The time of a step is proportional to the square of the displacement by diffusion.
+    moved = filter.longest_move * filter.matrix.diameter / (CONTACT_DIFFUSION * filter.mean_radius)
+    yield Shown(
+        "steps of colloids that touch over those here",
+        moved**2,
+        f"of {CONTACT_DIFFUSION:g} radii each, 6.4.6",
+    )
 
 
 def moment_of(radius: float) -> float:

@@ -28,6 +28,8 @@ def test_energies_and_encounters_of_colloids():
     # ln(2 / 4.735) / 0.3853 = -2.237 and ln(2 / 2.665) / 0.4513 = -0.636 standard deviations.
     assert small == pytest.approx(0.0127, abs=0.001)
     assert own == pytest.approx(0.25, abs=0.015)
+    # (0.02 x 0.4 mm / (0.03 x 5.1 nm))^2
+    assert found["steps of colloids that touch over those here"] == pytest.approx(2.734e9, rel=1e-3)
     assert found["time in which a colloid of B16's suspension meets another, s"] == pytest.approx(
         8.2e-3, rel=0.01
     )
