@@ -12,7 +12,6 @@ from tisim.analysis import Mean
 from tisim.cases.case import Check, Claim, Shown
 from tisim.cases.common.magnetic_fibre import WATER_TEMPERATURE, WATER_VISCOSITY
 from tisim.cases.common.runs import grouped
-from tisim.cases.concentration.scene import DIFFUSION as CONTACT_DIFFUSION
 from tisim.cases.packed_filter.lone_fibre import COMPARED_RESOLUTION, lone_fibres
 from tisim.cases.packed_filter.matrix import STEEL_SATURATION
 from tisim.cases.packed_filter.measures import (
@@ -58,6 +57,8 @@ OTHERS: dict[str, dict[str, Any]] = {
 """Settings of the dynamic separation that are compared with the usual ones."""
 SMALL_RADII = (2e-9, 1e-9)
 """Magnetic radii of colloids that fibres hardly hold, m."""
+CONTACT_DIFFUSION = 0.03
+"""Displacement by noise in a step of colloids that may touch, in radii (case ``concentration``)."""
 DRAWN_COLLOIDS = 100_000
 """Colloids of a distribution."""
 WEIGHT_FRACTION, WATER_DENSITY = 5e-5, 1000.0
