@@ -249,13 +249,9 @@ def _parallel(aspect: float, fraction: float, number: int, seed: int, axis: int,
             found = np.vstack([found, place])
         if len(found) == number:
             return found
-    rule = f"at most {fraction * len(found) / number:.3f} for parallel fibres of L/D = {aspect:g}"
-    must(
-        False,
-        "fraction of fibres",
-        f"{rule}, as {MOST_PLACES_TRIED} tries found no further free place",
-        fraction,
-    )
+    most, tries = fraction * len(found) / number, f"{MOST_PLACES_TRIED} tries found no further free place"
+    rule = f"at most {most:.3f} for parallel fibres of L/D = {aspect:g}, as {tries}"
+    must(False, "fraction of fibres", rule, fraction)
     raise AssertionError
 
 

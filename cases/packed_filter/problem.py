@@ -74,8 +74,8 @@ SEARCHED: dict[str, dict[str, Any]] = {
     "small": {"number": 100, "resolution": 5.0, "digits": None},
     "default": {"number": 300, "resolution": 8.0},
 }
-"""Colloids of a run, cells of its flow over D and the sum of its field, by size. An octree
-for each design does not pay for some hundred colloids."""
+"""Colloids of a run, cells of its flow over D and digits of the sum of its field, by size. An octree for each
+design takes longer than it saves for some hundred colloids."""
 MORE_COLLOIDS = {"pressure": 1, "throughput": 1, "select": 4}
 """Factor of the number of colloids by variant: the difference of two fractions is noisier than a fraction.
 With 100 colloids its standard deviation between starts is 0.15, with 400 it is 0.07."""

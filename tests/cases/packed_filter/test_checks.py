@@ -16,7 +16,8 @@ def test_the_claims_hold():
 
 
 def test_energies_and_encounters_of_colloids():
-    """m B / kT and Gamma grow as the volume of a colloid; small colloids are those of the lognormal law."""
+    """m B / kT and Gamma are proportional to the volume of a colloid. The fractions of small colloids are
+    those of the lognormal distribution."""
     found = {one.name: one.value for one in of_colloids(filter_of("small"))}
     energy = [value for name, value in found.items() if name.startswith("energy")]
     assert energy == pytest.approx([60.23 * (radius / 5.1) ** 3 for radius in (5.1, 2.0, 1.0)], rel=1e-3)
